@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.direction_votes import VotePlan
 from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
@@ -115,7 +115,9 @@ def begins() -> None:
             power = np.mean(heard**2, axis=0)
             onset = np.argmax(power > ONSET * power.max()) / BEGIN_RATE
             shape = ArrayShape.of(places)
-            plan = vote_plan(shape, 340.0, BEGIN_RATE, (200.0, 0.45 * BEGIN_RATE))
+            plan = VotePlan.of(
+                shape, 340.0, BEGIN_RATE, band_hz=(200.0, 0.45 * BEGIN_RATE)
+            )
             steps, _ = hear_sources(
                 heard, ListenerMemory.blank(plan), plan, ListenerParameters()
             )

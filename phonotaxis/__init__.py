@@ -15,28 +15,35 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.recordings.array_geometry import ArrayGeometry
-    from analysis.recordings.locate import locate
-    from analysis.recordings.locate_result import LocateResult, SourceEstimate
+    from analysis.recordings.locate_result import SourceEstimate
+    from analysis.run_error import RunError
     from analysis.runs.columns import columns
     from analysis.sweeps.plan import SweepPlan
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
-    from phonotaxis.runs import RunResult, simulate
-    from phonotaxis.studies import (
-        ComparisonResult,
-        StabilityResult,
-        SweepResult,
-        compare,
-        stability,
-        sweep,
+    from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
+    from phonotaxis.listening import ListenResult, listen
+    from phonotaxis.loops import DesignResult, StabilityResult, design, stability
+    from phonotaxis.recordings import (
+        CalibrationResult,
+        LocateResult,
+        calibrate,
+        locate,
     )
+    from phonotaxis.result import Result
+    from phonotaxis.runs import RunResult, simulate
     from systems.framework.input_error import InputError
 
 __all__ = [
     "ArrayGeometry",
+    "CalibrationResult",
     "ComparisonResult",
+    "DesignResult",
     "InputError",
+    "ListenResult",
     "LocateResult",
+    "Result",
+    "RunError",
     "RunResult",
     "Scenario",
     "SourceEstimate",
@@ -45,9 +52,12 @@ __all__ = [
     "SweepPlan",
     "SweepResult",
     "__version__",
+    "calibrate",
     "columns",
     "compare",
+    "design",
     "library_scenarios",
+    "listen",
     "load_scenario",
     "locate",
     "main",
@@ -62,24 +72,32 @@ __version__: str
 #: Module of each public name. Type checkers use the imports above instead.
 _HOMES = {
     "ArrayGeometry": "analysis.recordings.array_geometry",
-    "ComparisonResult": "phonotaxis.studies",
+    "CalibrationResult": "phonotaxis.recordings",
+    "ComparisonResult": "phonotaxis.batches",
+    "DesignResult": "phonotaxis.loops",
     "InputError": "systems.framework.input_error",
-    "LocateResult": "analysis.recordings.locate_result",
+    "ListenResult": "phonotaxis.listening",
+    "LocateResult": "phonotaxis.recordings",
+    "Result": "phonotaxis.result",
+    "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
     "SourceEstimate": "analysis.recordings.locate_result",
     "SourceListener": "analysis.arrays.voting.source_listener_block",
-    "StabilityResult": "phonotaxis.studies",
+    "StabilityResult": "phonotaxis.loops",
     "SweepPlan": "analysis.sweeps.plan",
-    "SweepResult": "phonotaxis.studies",
+    "SweepResult": "phonotaxis.batches",
+    "calibrate": "phonotaxis.recordings",
     "columns": "analysis.runs.columns",
-    "compare": "phonotaxis.studies",
+    "compare": "phonotaxis.batches",
+    "design": "phonotaxis.loops",
     "library_scenarios": "diagrams.scenario.loading",
+    "listen": "phonotaxis.listening",
     "load_scenario": "diagrams.scenario.loading",
-    "locate": "analysis.recordings.locate",
+    "locate": "phonotaxis.recordings",
     "simulate": "phonotaxis.runs",
-    "stability": "phonotaxis.studies",
-    "sweep": "phonotaxis.studies",
+    "stability": "phonotaxis.loops",
+    "sweep": "phonotaxis.batches",
 }
 
 
@@ -116,10 +134,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         # All imports are inside the ``try`` statement, because an interrupt may come
         # while they run.
-        from analysis.commands.interrupts import Interrupts
+        from phonotaxis.commands.interrupts import Interrupts
 
         with Interrupts(last=arguments is None) as interrupts:
-            from analysis.commands.command_line import run_words
+            from phonotaxis.commands.command_line import run_words
 
             words = sys.argv[1:] if arguments is None else arguments
             status = run_words(list(words), interrupts)

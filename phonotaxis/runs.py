@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from contextlib import nullcontext
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,6 +14,10 @@ from diagrams.running.audio.run_audio import RunAudio
 from diagrams.scenario.loading import load_scenario
 from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.scenario_files import check_files
+from diagrams.scenario.warnings.warnings_of import warnings_of
+from phonotaxis.result import Prepared, Result, ignore
+from phonotaxis.run_files import CSV_FILE, MCAP_FILE, SavedAudio, SavedMovie
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
@@ -21,8 +27,14 @@ __all__ = ["RunResult", "simulate"]
 
 
 @dataclass(frozen=True, repr=False)
-class RunResult(diagrams.RunResult):
+class RunResult(diagrams.RunResult, Result):
     """Result of a run, with methods that make pictures and files."""
+
+    audio: dict[str, Any] | None = None
+    """Directory of the saved sound, and the contents of its files; None if no sound was
+    saved."""
+    movie: str | None = None
+    """File of the movie; None if no movie was written."""
 
     @classmethod
     def of(cls, result: diagrams.RunResult) -> RunResult:
@@ -38,11 +50,29 @@ class RunResult(diagrams.RunResult):
             f"{self.ending} after {self.simulated_s:.1f} s>"
         )
 
-    def summary(self) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
         """Returns the JSON document of ``phonotaxis simulate``."""
-        from analysis.runs.run_report import run_summary
+        from analysis.runs.run_report import run_document
 
-        return run_summary(self, None)
+        files = {"audio": self.audio, "movie": self.movie}
+        given = {name: value for name, value in files.items() if value is not None}
+        return {**run_document(self), **given}
+
+    def __str__(self) -> str:
+        """Summary of the run, for a terminal."""
+        from analysis.runs.run_report import run_text
+
+        lines = [run_text(self, self.document())]
+        if self.audio is not None:
+            lines.append(f"{'sound':<21} {self.audio['directory']}")
+        if self.movie is not None:
+            lines.append(f"{'movie':<21} {self.movie}")
+        return "\n".join(lines)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Assumptions that the scenario breaks, each in one line."""
+        return tuple(str(each) for each in self.warnings)
 
     def plot(self, what: Literal["trajectory", "time_series"] = "trajectory") -> Figure:
         """Draws the run.
@@ -143,26 +173,31 @@ class RunResult(diagrams.RunResult):
         self.trajectory.to_parquet(path, index=False)
         return Path(path)
 
-    def save(self, directory: str | Path | None = None) -> Path:
-        """Writes all files of ``phonotaxis simulate`` into a new directory.
+    def write(
+        self,
+        document: dict[str, Any],
+        directory: Path,
+        *,
+        pictures: bool = True,
+        mcap: bool = False,
+        csv: bool = False,
+    ) -> None:
+        """Writes the files of the run into an existing directory.
 
         Args:
-            directory: New or empty directory. None means the next number under
-                ``results``.
-
-        Returns:
-            Path of the directory.
-
-        Raises:
-            InputError: The directory is in use, or cannot be created or written.
+            document: The JSON document, with the key ``out``.
+            directory: Existing directory.
+            pictures: Whether to write the PNG and SVG files.
+            mcap: Whether to write ``run.mcap``.
+            csv: Whether to write ``trajectory.csv``.
         """
-        from analysis.reporting.result_directory import whole_directory
-        from analysis.runs.run_report import run_summary
         from analysis.views.run_directory import write_run
 
-        with whole_directory(directory) as (shown, partial):
-            write_run(self, run_summary(self, shown), partial)
-        return shown
+        write_run(self, document, directory, pictures=pictures)
+        if mcap:
+            self.to_mcap(directory / MCAP_FILE)
+        if csv:
+            self.to_csv(directory / CSV_FILE)
 
 
 def simulate(
@@ -171,8 +206,13 @@ def simulate(
     engine: Engine | None = None,
     progress: Callable[[float], None] | None = None,
     audio: RunAudio | None = None,
+    save_audio: str | Path | None = None,
+    movie: str | Path | None = None,
 ) -> RunResult:
     """Runs a scenario to its end.
+
+    A warning of the logger ``phonotaxis`` states each assumption that the scenario
+    breaks. ``notes`` of the result contains the same texts.
 
     Args:
         scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
@@ -183,16 +223,81 @@ def simulate(
         progress: Function that is called once per simulated second with the simulated
             time in seconds.
         audio: Open files for the sound that the robot hears and plays. None means that
-            no sound is saved.
+            ``save_audio`` decides.
+        save_audio: New or empty directory for the sound that robots hear and
+            loudspeakers play. None means that no sound is saved.
+        movie: New .gif or .mp4 file for a movie of the run from above. None means no
+            movie.
 
     Returns:
         Result of the run.
 
     Raises:
-        InputError: The scenario is not valid. The message names the field and the
-            remedy.
+        InputError: The scenario or a file is not valid. The message names the field and
+            the remedy.
+        RunError: The encoder of the movie failed.
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    result = diagrams.simulate(scenario, engine=engine, progress=progress, audio=audio)
-    return RunResult.of(result)
+    prepared = prepare_simulation(
+        scenario,
+        engine=engine,
+        audio=audio,
+        saved=SavedAudio(save_audio, scenario) if save_audio is not None else None,
+        movie=SavedMovie(movie, scenario) if movie is not None else None,
+    )
+    return prepared.run(progress or ignore)
+
+
+def prepare_simulation(
+    scenario: Scenario,
+    *,
+    engine: Engine | None = None,
+    audio: RunAudio | None = None,
+    saved: SavedAudio | None = None,
+    movie: SavedMovie | None = None,
+) -> Prepared[RunResult]:
+    """Checks a scenario, and builds what a run needs; see ``simulate``.
+
+    Args:
+        scenario: Scenario of the run.
+        engine: Engine of the run; None means that of the scenario.
+        audio: Open files for the sound; None means those of ``saved``.
+        saved: Directory for the sound of the run.
+        movie: Movie of the run.
+    """
+    check_files(scenario)
+    for warning in warnings_of(scenario):
+        logging.getLogger("phonotaxis").warning("%s", warning)
+    follower = None
+    if (engine or scenario.engine) == "compiled":
+        diagrams.prepared_loop(scenario)
+    else:
+        follower = diagrams.build_sound_follower(scenario, log=True)
+
+    def run(progress: Callable[[float], None]) -> RunResult:
+        with movie.sound(saved) if movie else nullcontext(saved) as sound:
+            with sound.opened() if sound else nullcontext(audio) as files:
+                result = RunResult.of(
+                    diagrams.simulate(
+                        scenario,
+                        engine=engine,
+                        follower=follower,
+                        progress=progress,
+                        audio=files,
+                    )
+                )
+            if movie is not None:
+                movie.write(result, sound, lambda: progress(result.simulated_s))
+        return replace(
+            result,
+            audio=saved.facts() if saved else None,
+            movie=movie.shown if movie else None,
+        )
+
+    return Prepared(
+        run=run,
+        total=scenario.duration_s,
+        unit="s simulated",
+        left=saved.left if saved else str,
+    )

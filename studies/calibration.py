@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from analysis.calibration.calibrate import CalibrationRun, calibrate, calibration_run
-from analysis.calibration.calibration_sounds import CalibrationSounds
-from analysis.calibration.measured_sound import MeasuredSound
+from analysis.calibration.calibration_sounds import CalibrationSounds, MeasuredSound
 from analysis.recordings.array_geometry import ArrayGeometry
 from studies.tables import Table
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.certificates.certificate_trials import CertificateTrials, try_certificate
-from analysis.certificates.diagram_trials import DiagramTrials, try_diagram
 from analysis.certificates.energy_certificate import certify_energy
-from analysis.certificates.sos_region import SosRegion, sos_region
 from diagrams import load_scenario
+from studies.proofs.diagram_trials import DiagramTrials, try_diagram
+from studies.proofs.sos_region import SosRegion, sos_region
 from studies.tables import Table
 from systems.framework.input_error import InputError
 
@@ -202,12 +202,10 @@ def run(options: argparse.Namespace) -> Iterator[Table]:
 
 def _draw(rows: Sequence[CertificateRow], directory: Path) -> None:
     """Map, phase plane and region of each law."""
-    from analysis.certificates.certificate_plots import (
-        plot_energy_certificate,
-        plot_sos_region,
-    )
-    from analysis.nonlinear.nonlinear_plots import plot_phase_portrait
-    from analysis.nonlinear.phase_portrait import phase_portrait
+    from analysis.certificates.certificate_plots import plot_energy_certificate
+    from studies.nonlinear.phase_portrait import phase_portrait
+    from studies.nonlinear.plots import plot_phase_portrait
+    from studies.proofs.plots import plot_sos_region
 
     directory.mkdir(parents=True, exist_ok=True)
     for row in rows:

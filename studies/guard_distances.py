@@ -21,8 +21,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Wedge
 
 from analysis.reporting.palette import COLOURS, SERIES_COLOURS, draw_grid
-from analysis.safety.driver_trials import drive_at_a_wall
-from diagrams import Scenario
+from analysis.safety.driver_trials import TWIST, make_trial, run_result
+from diagrams import RunResult, Scenario
 from diagrams.scenario.warnings.guarantees import clear_way, seen_angle_deg
 from studies.tables import Table
 from systems.ranging.parameters import UltrasonicParameters
@@ -63,6 +63,24 @@ def passed_distance(speed: float, body_speed: float) -> float:
     passed = run.columns["guard_action"] == PASSED
     first = np.argmin(passed) if not passed.all() else len(passed) - 1
     return float(wall_m - run.columns["p_WB_x"][first])
+
+
+def drive_at_a_wall(speed: float, body_speed: float) -> tuple[RunResult, float]:
+    """Simulates a robot that drives at a wall straight ahead.
+
+    Args:
+        speed: Commanded speed, m/s.
+        body_speed: Largest obstacle speed that the robot's guard allows for, m/s.
+
+    Returns:
+        The run, and the x coordinate of the wall's face, m.
+    """
+    names, rows = ("wall", "straight", "no noise"), [[1e3, TWIST, speed, 0.0, 0, 0]]
+    wall_m = 2.9
+    boxes = [(wall_m + 0.05, 0.0, 0.0, 0.1, 3.0)]
+    trial = make_trial(names, boxes, rows, 0.0, (8.0, 0.0), 1)
+    changes = {"guard": {"obstacle_speed_m_s": body_speed}, "duration_s": 20.0}
+    return run_result(trial, changes), wall_m
 
 
 def draw_chart(passed: Mapping[tuple[float, float], float]) -> Figure:

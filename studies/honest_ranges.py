@@ -19,7 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.recordings.locate import hear
-from analysis.recordings.locate_result import LocateResult
+from analysis.recordings.locate_result import LocatedSource
+from analysis.recordings.prepared_recording import RecordedSamples
+from analysis.recordings.recording_search import MAD_TO_STD
 from analysis.reporting.intervals import estimate_rate
 from studies.support.drawn_recordings import (
     RATE,
@@ -95,17 +97,17 @@ def try_array(cell: Cell, drawn: DrawnArray, rng: np.random.Generator) -> Trial:
     """Records and locates."""
     samples = record(drawn, cell, rng)
     try:
-        heard = hear(samples, RATE, drawn.geometry, "recording")
+        heard = hear(RecordedSamples(samples, RATE, "recording"), drawn.geometry)
     except InputError as error:
         return Trial(cell, drawn, str(error), (), (), *(math.nan,) * 4, ())
     known = drawn.geometry.known
-    found = LocateResult(
+    found = LocatedSource(
         {},
         known.shape,
         heard.estimates,
         len(heard.search.stretches),
         largest_range_error=known.largest_range_error,
-    ).summary()
+    ).main_source()
     late: list[float] = []
     for sighting in heard.sightings:
         lag = np.append(0.0, sighting.tau - drawn.tau)
@@ -153,7 +155,7 @@ def own_deviations(trials: Sequence[Trial]) -> Callable[[Trial], float]:
     for trial in trials:
         late[alike(trial)].extend(trial.late_s)
     found = {
-        key: 1.4826 * float(np.median(np.abs(of))) for key, of in late.items() if of
+        key: MAD_TO_STD * float(np.median(np.abs(of))) for key, of in late.items() if of
     }
     return lambda trial: found.get(alike(trial), 0.0)
 

@@ -23,10 +23,10 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
-from analysis.hearing.synthetic_speech import speech_like
 from analysis.runs.measured_run import MeasuredRun
 from diagrams import RunResult, load_scenario, simulate
 from studies.support.figures import Figure, bounds_table
+from studies.support.synthetic_speech import speech_like
 from studies.tables import Table
 
 DURATION_S = 12.0

@@ -7,20 +7,23 @@ gaps and points hold the robot, and what is proved where source or obstacles mov
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Iterator
+from pathlib import Path
 
-from analysis.certificates.disturbance_bounds import disturbance_bounds, source_bound
-from analysis.laws.radial_law import radial_law
-from analysis.models.point_mass import point_mass
-from analysis.nonlinear.contact_oscillation import contact_oscillation
-from analysis.nonlinear.equilibrium_maps import gap_map
-from analysis.nonlinear.phase_portrait import phase_portrait
-from analysis.nonlinear.velocity_passivity import (
+from analysis.certificates.velocity_passivity import (
     energy_balance,
     velocity_term_passivity,
 )
-from analysis.nonlinear.velocity_terms import velocity_term_analysis
+from analysis.laws.radial_law import radial_law
+from analysis.models.point_mass import point_mass
 from diagrams import Scenario, load_scenario
+from studies.nonlinear.contact_oscillation import contact_oscillation
+from studies.nonlinear.equilibrium_maps import gap_map, offset_map
+from studies.nonlinear.phase_portrait import phase_portrait
+from studies.nonlinear.stiffness_ratio import stiffness_ratio_map
+from studies.nonlinear.velocity_terms import velocity_term_analysis
+from studies.proofs.disturbance_bounds import disturbance_bounds, source_bound
 from studies.support.trap_stiffness import trap_stiffness
 from studies.tables import Table
 
@@ -32,27 +35,32 @@ NAMES = {
     "active 2017": "active2017",
 }
 _GAPS_M = tuple(round(0.1 * k, 1) for k in range(2, 16))
+_RATIOS = (1.2, 1.5, 2.0, 3.0, 4.0, 8.0, 16.0, 64.0)
 _TERMS = {"printed": "printed", "closing": "`closing`"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The study has none."""
+    """Options of the study."""
+    parser.add_argument("--pictures", type=Path, help="directory to draw into")
 
 
 def run(options: argparse.Namespace) -> Iterator[Table]:
-    """The tables."""
-    del options
+    """The tables; draws the pictures where they are asked for."""
     yield from (
         velocity_terms(),
         energies(),
         one_sided_damping(),
         oscillations(),
         gaps(),
+        offsets(),
+        stiffness_ratios(),
         stiffness_across(),
         moving_source(),
         obstacle_that_comes(),
         reach_and_ratio(),
     )
+    if options.pictures is not None:
+        draw(options.pictures)
 
 
 def scenario_of(law: str) -> Scenario:
@@ -172,11 +180,41 @@ def gaps() -> Table:
     return Table("gaps", head, rows())
 
 
-def _stretch(held: tuple[float, ...]) -> str:
+def _stretch(held: tuple[float, ...], digits: int = 1) -> str:
     if not held:
         return "none"
     ends = sorted({min(held), max(held)})
-    return "-".join(f"{end:.1f}" for end in ends) + " m"
+    return "-".join(f"{end:.{digits}f}" for end in ends) + " m"
+
+
+def offsets() -> Table:
+    """Offsets of one box from the line to the source at which the robot stops or hits.
+
+    The offset is that of the center of a box 0.1 m wide.
+    """
+
+    def rows() -> Iterator[list[str]]:
+        for law in NAMES:
+            held = offset_map(scenario_of(law), sensing="exact nearest").jams
+            cones = offset_map(scenario_of(law), sensing="cones")
+            stretches = (held, cones.jams, cones.collisions)
+            yield [law, *(_stretch(each, digits=2) for each in stretches)]
+
+    head = ("held at offsets of", "exact nearest point", "cones", "cones: hits it at")
+    return Table("offsets", head, rows())
+
+
+def stiffness_ratios() -> Table:
+    """Distances of the head-on equilibria of the active law of 2019 over k_ref/K_0."""
+    found = stiffness_ratio_map(scenario_of("active 2019"), _RATIOS)
+    rows = [
+        [f"{ratio:g}", *("none" if math.isnan(c) else f"{c:.3f} m" for c in places)]
+        for ratio, *places in zip(
+            found.ratios, found.outer_m, found.inner_m, strict=True
+        )
+    ]
+    head = ("k_ref/K_0", "the robot stops at c", "and no longer below c")
+    return Table("stiffness ratio", head, rows)
 
 
 def stiffness_across() -> Table:
@@ -266,3 +304,32 @@ def reach_and_ratio() -> Table:
         "certified / safe within 1.5 m",
     )
     return Table("reach", head, rows())
+
+
+def draw(directory: Path) -> None:
+    """Pictures of the velocity terms, oscillations, maps and bounds of each law."""
+    from studies.nonlinear.plots import (
+        plot_contact_oscillation,
+        plot_equilibrium_maps,
+        plot_ratio_map,
+        plot_velocity_terms,
+    )
+    from studies.proofs.plots import plot_disturbance_bounds
+
+    directory.mkdir(parents=True, exist_ok=True)
+    active = scenario_of("active 2019")
+    figures = {"stiffness_ratio": plot_ratio_map(stiffness_ratio_map(active))}
+    for name, law in NAMES.items():
+        case = scenario_of(name)
+        sensing = ("exact nearest", "exact sum", "cones")
+        between = [gap_map(case, _GAPS_M, sensing=each) for each in sensing]
+        beside = [offset_map(case, sensing=each) for each in sensing[::2]]
+        figures |= {
+            f"velocity_terms_{law}": plot_velocity_terms(velocity_term_analysis(case)),
+            f"oscillation_{law}": plot_contact_oscillation(contact_oscillation(case)),
+            f"gaps_{law}": plot_equilibrium_maps(between),
+            f"offsets_{law}": plot_equilibrium_maps(beside),
+            f"moving_bodies_{law}": plot_disturbance_bounds(disturbance_bounds(case)),
+        }
+    for name, figure in figures.items():
+        figure.savefig(directory / f"{name}.png", dpi=90)

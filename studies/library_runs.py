@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from analysis.runs.metric_table import run_metrics
-from analysis.runs.run_report import run_summary, summary_text
+from analysis.runs.run_report import run_document, run_text
 from diagrams import RunResult, load_scenario, simulate
 from studies.tables import Table
 from systems.laws.catalogue import FORCE_LAWS
@@ -86,7 +86,7 @@ def endings(scenarios: tuple[str, ...] = SCENARIOS) -> Table:
 def summary_of_the_default_run() -> Table:
     """What ``phonotaxis simulate`` prints, but for the speed and names of files."""
     result = simulate(load_scenario("default"))
-    printed = summary_text(result, run_summary(result, None)).splitlines()
+    printed = run_text(result, run_document(result)).splitlines()
     lines = [[line] for line in printed if not line.startswith("speed")]
     return Table("summary of the default run", ("line",), lines)
 

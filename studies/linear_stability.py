@@ -15,7 +15,6 @@ from analysis.linear.contact_mode import contact_limits
 from analysis.linear.delay_margin import DELAY_PLACES, DelayedLoop
 from analysis.linear.delayed_run import check_delay_margin
 from analysis.linear.loop_margins import LoopMargins, all_margins, loop_margins
-from analysis.linear.sampled_stability import check_conditions
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import find_equilibria, follow_equilibrium
 from analysis.models.linearisation import check_gradient, compare_routes
@@ -23,6 +22,9 @@ from analysis.models.open_loops import DIRECTIONS, BreakPoint, target_loop
 from analysis.models.operating_points import OperatingPoint, moving_equilibrium
 from diagrams import load_scenario
 from diagrams.scenario.scenario import Scenario
+from studies.linear.burst_gaps import gap_chart
+from studies.linear.root_locus import RootLocus, root_loci
+from studies.linear.sampled_stability import check_conditions, poles_against_period
 from studies.tables import Table
 from systems.framework.signals import TICK_S
 
@@ -152,6 +154,40 @@ def contact_rows() -> Iterator[Sequence[str]]:
         yield (f"{1e3 * lag:.0f} ms", *(f"{a:.1f}, {b:.0f}" for a, b in pairs))
 
 
+def limit_rows() -> Iterator[Sequence[str]]:
+    """Largest stable gains and sample period; the other values are the scenario's."""
+    scenario = Scenario(law="none")
+    period = poles_against_period(scenario)
+    longest = f"{period.longest_stable_s:.3g}"
+    yield "none", "`tick_s`", "target", f"{period.today_s:g}", longest
+    for law in LAWS:
+        for locus in root_loci(Scenario(law=law)):
+            if law == "none" or locus.loop == "contact":
+                yield (
+                    law,
+                    f"`{locus.parameter}`",
+                    locus.loop,
+                    f"{locus.today:.3g}",
+                    _limit(locus),
+                )
+
+
+def _limit(locus: RootLocus) -> str:
+    if (locus.poles_today.real >= 0.0).any():
+        return "unstable now"
+    return "any" if locus.limit is None else f"{locus.limit:.3g}"
+
+
+def silence_rows() -> Iterator[Sequence[str]]:
+    """Longest stable silence of the sound for each setting of ``tracker.hold``."""
+    for law in ("none", "active"):
+        chart = gap_chart(Scenario(law=law))
+        for hold in chart.holds:
+            longest = chart.longest_stable_s(hold)
+            more = " or more" if longest == chart.gaps_s[-1] else ""
+            yield law, hold, f"{longest:g}{more}"
+
+
 def _steps() -> Iterator[Sequence[str]]:
     for law in LAWS:
         check = check_step(Scenario(law=law), full=True)
@@ -233,7 +269,19 @@ def tables(duration_s: float = 300.0) -> Iterator[Table]:
             for check in check_conditions()
         ),
     )  # fmt: skip
-    yield Table("bursts", ("law", "hold", "largest multiplier", "simulated"), _bursts())
+    yield Table(
+        "stability limits",
+        ("law", "parameter", "loop", "current", "stable up to"),
+        limit_rows(),
+    )
+    yield Table(
+        "bursts",
+        ("law", "hold", "direction", "largest multiplier", "simulated"),
+        _bursts(),
+    )
+    yield Table(
+        "silences", ("law", "hold", "stable up to a silence of (s)"), silence_rows()
+    )
     latencies = contact_limits(Scenario()).latency_ticks
     yield Table(
         "contact",
@@ -244,9 +292,18 @@ def tables(duration_s: float = 300.0) -> Iterator[Table]:
 
 def draw(directory: Path) -> None:
     """The page's pictures."""
-    from analysis.linear.burst_gaps import gap_chart
-    from analysis.linear.linear_plots import plot_equilibria, plot_nyquist
-    from analysis.stability.chart_plots import plot_contact_limits, plot_gap_chart
+    from analysis.linear.linear_plots import (
+        plot_contact_limits,
+        plot_equilibria,
+        plot_nyquist,
+    )
+    from studies.linear.charts import (
+        plot_chart,
+        plot_gap_chart,
+        plot_poles_against_period,
+        plot_root_loci,
+    )
+    from studies.linear.sampled_stability import gain_chart, gain_delay_chart
 
     directory.mkdir(parents=True, exist_ok=True)
     scenario = Scenario(law="active")
@@ -257,6 +314,10 @@ def draw(directory: Path) -> None:
         "nyquist": plot_nyquist(margins),
         "burst_gaps": plot_gap_chart(gap_chart(Scenario(law="none"))),
         "contact_limits": plot_contact_limits(contact_limits(scenario)),
+        "root_loci": plot_root_loci(root_loci(scenario)),
+        "sample_period": plot_poles_against_period(poles_against_period(scenario)),
+        "stable_gains": plot_chart(gain_chart(scenario)),
+        "stable_delays": plot_chart(gain_delay_chart(scenario)),
     }.items():
         figure.savefig(directory / f"{name}.png", dpi=90)
 

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.hearing.cramer_rao import LocalizationBound, position_bound
-from analysis.hearing.free_field import Loudspeaker
 from analysis.hearing.paper_tables import PAPER_CELLS
+from analysis.hearing.single_frames import Loudspeaker
 from studies.support.figures import stay_on_one_core
 from studies.support.peer_estimators import SHAPE, C, Frame, estimators
 from studies.tables import Table

@@ -20,16 +20,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.direction_votes import VotePlan
 from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
     TrackedSources,
     hear_sources,
 )
-from analysis.hearing.synthetic_speech import speech_like
 from analysis.recordings.heard_sources import HeardSources, heard_sources
 from studies.support.figures import Figure, bounds_table
+from studies.support.synthetic_speech import speech_like
 from studies.support.talker_peers import (
     OPEN_PEERS,
     PEERS,
@@ -297,7 +297,9 @@ def crossings_rows(
 
 def _steps(channels: NDArray[np.float32]) -> list[TrackedSources]:
     """As ``phonotaxis listen`` hears them, in blocks of 20 ms."""
-    plan = vote_plan(ArrayShape.of(TALKER_ARRAYS[SQUARE]), C, float(RATE), BAND_HZ)
+    plan = VotePlan.of(
+        ArrayShape.of(TALKER_ARRAYS[SQUARE]), C, float(RATE), band_hz=BAND_HZ
+    )
     memory, steps = ListenerMemory.blank(plan), []
     size = round(0.02 * RATE)
     for first in range(0, channels.shape[1], size):

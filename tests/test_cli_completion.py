@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 import phonotaxis
-from analysis.commands.command_line import COMMANDS
 from diagrams import library_scenarios
 from diagrams.scenario.fields.shipped import known_laws
+from phonotaxis.commands.command_line import COMMANDS
 
 #: A shell that says nothing for so long hangs.
 WAIT_S = 60.0

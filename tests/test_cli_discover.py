@@ -9,9 +9,9 @@ import pytest
 
 import phonotaxis
 from analysis import installation
-from analysis.commands.command_line import COMMANDS, make_parser
 from diagrams import load_scenario
 from diagrams.scenario.fields.shipped import schema_text
+from phonotaxis.commands.command_line import COMMANDS, make_parser
 
 
 def call(capsys, *words: str) -> tuple[int, str, str]:

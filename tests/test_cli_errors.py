@@ -59,13 +59,13 @@ def fail(*_args, **_options):
 @pytest.mark.parametrize(
     ("words", "place"),
     [
-        (["design"], "analysis.design.design_study.study_design"),
+        (["design"], "phonotaxis.loops.study_design"),
         (["simulate", *SHORT], "diagrams.simulate"),
-        (["stability"], "analysis.stability.law_analysis.analyse_law"),
+        (["stability"], "phonotaxis.loops.analyse_law"),
         (["accuracy"], "analysis.hearing.localization.prepare_localization"),
-        (["locate", "heard.wav"], "analysis.recordings.locate.located"),
+        (["locate", "heard.wav"], "phonotaxis.recordings.located"),
         (["scenarios"], "diagrams.library_scenarios"),
-        (["compare", "wall"], "analysis.sweeps.batch.prepare_comparison"),
+        (["compare", "wall"], "phonotaxis.batches.prepare_comparison"),
     ],
 )
 def test_a_bug_is_no_bad_input(capsys, tmp_path, monkeypatch, words, place):
@@ -93,7 +93,7 @@ def test_a_value_error_of_the_program_is_a_bug(capsys, tmp_path, monkeypatch):
         raise ValueError("operands: could not be broadcast together")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("analysis.design.design_study.study_design", wrong)
+    monkeypatch.setattr("phonotaxis.loops.study_design", wrong)
     assert call(capsys, "design")[0] == 1
 
 
@@ -198,8 +198,8 @@ def test_a_partial_is_a_law(capsys, laws):
 @pytest.mark.parametrize(
     ("command", "written"),
     [
-        (["simulate", *SHORT], "analysis.runs.run_report.write_scenario"),
-        (["design", "--json"], "analysis.design.design_text.write_design"),
+        (["simulate", *SHORT], "analysis.views.run_directory.write_scenario"),
+        (["design", "--json"], "phonotaxis.loops.write_design"),
     ],
 )
 def test_a_full_disk_is_one_line_and_leaves_nothing(
@@ -210,10 +210,8 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(written, no_space)
-    monkeypatch.setattr(
-        "analysis.design.design_study.study_design", lambda *_a, **_k: None
-    )
-    monkeypatch.setattr("analysis.design.design_text.design_summary", lambda *_: {})
+    monkeypatch.setattr("phonotaxis.loops.study_design", lambda *_a, **_k: None)
+    monkeypatch.setattr("phonotaxis.loops.design_document", lambda *_: {})
     status, printed, complaint = call(capsys, *command)
     said = complaint or json.loads(printed)["error"]["message"]
     assert status == 1

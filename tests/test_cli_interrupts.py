@@ -22,7 +22,7 @@ import sys
 import phonotaxis
 signal.signal(signal.SIGINT, signal.default_int_handler)
 def loads(event, arguments):
-    if event == "import" and arguments[0] == "analysis.commands.interrupts":
+    if event == "import" and arguments[0] == "phonotaxis.commands.interrupts":
         print("started", flush=True)
 sys.addaudithook(loads)
 sys.exit(phonotaxis.main())

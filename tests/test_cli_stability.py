@@ -30,7 +30,7 @@ MASS = Part[float](
         ),
     ),
 )
-IMPOSSIBLE = Part("impossible", "Impossible", impossible, lambda data: [], slow=True)
+IMPOSSIBLE = Part("impossible", "Impossible", impossible, lambda data: [])
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def test_a_part_that_fails_is_no_success(capsys, tmp_path, monkeypatch):
         Part("unshown", "Unshown", lambda study: [1], lambda data: [Figure(draw, "")]),
         Part("after", "After", lambda study: [1, 2], lambda data: ["last"]),
     )
-    monkeypatch.setattr(report_parts, "parts_for", lambda _, full: parts)
+    monkeypatch.setattr(report_parts, "parts_for", lambda _: parts)
     out = tmp_path / "out"
     status, printed, complaint = run(capsys, "--out", str(out))
     assert status == 1

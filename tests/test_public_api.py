@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import html
+import inspect
 import json
 import re
 import runpy
@@ -17,11 +18,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import soundfile
 from ruamel.yaml import YAML
 
 import diagrams
 import phonotaxis
 from analysis.stability import report_parts
+from tests.analysis.listening.plane_waves import RATE, SQUARE, plane_waves
 
 ROOT = Path(__file__).resolve().parents[1]
 IMPORT = """
@@ -92,7 +95,8 @@ def test_settings_may_be_a_mapping():
 
 def test_a_run_is_that_of_the_diagrams(run: phonotaxis.RunResult):
     ours = diagrams.simulate(run.scenario)
-    assert {each.name for each in fields(run)} == {each.name for each in fields(ours)}
+    own = {each.name for each in fields(run)} - {each.name for each in fields(ours)}
+    assert own == {"audio", "movie"}
     assert run.trajectory.equals(ours.trajectory)
     assert run.ending == ours.ending
 
@@ -111,6 +115,51 @@ def test_tables_lose_no_digit(run: phonotaxis.RunResult, tmp_path: Path):
     np.testing.assert_array_equal(np.array(numbers), run.trajectory.to_numpy())
     binary = pd.read_parquet(run.to_parquet(tmp_path / "run.parquet"))
     pd.testing.assert_frame_equal(binary, run.trajectory, check_exact=True)
+
+
+def test_every_function_has_a_result_of_one_shape():
+    functions = (
+        "simulate", "sweep", "compare", "stability", "design", "locate", "listen",
+        "calibrate",
+    )  # fmt: skip
+    for name in functions:
+        kind = getattr(
+            phonotaxis, inspect.signature(getattr(phonotaxis, name)).return_annotation
+        )
+        assert issubclass(kind, phonotaxis.Result)
+        assert not inspect.isabstract(kind)
+        assert kind.__str__ is not object.__str__
+
+
+def test_a_run_is_printed_as_by_the_command(
+    run: phonotaxis.RunResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """But for the times and the place."""
+    scenario = run.save(tmp_path / "api") / "scenario.yaml"
+    words = ["simulate", str(scenario), "--no-plots", "--out", str(tmp_path / "out")]
+    assert phonotaxis.main(words) == 0
+    printed = capsys.readouterr().out.splitlines()
+    lines = str(run).splitlines()
+    assert [line[:21] for line in printed] == [
+        *(line[:21] for line in lines), f"{'results':21}", f"{'replay':21}"
+    ]  # fmt: skip
+    assert printed[1:-3] == lines[1:-1]
+    saved = json.loads((tmp_path / "api" / "summary.json").read_text("utf-8"))
+    assert saved == {**run.document(), "out": str(tmp_path / "api")}
+
+
+def test_a_run_saves_its_sound_and_a_movie(tmp_path: Path):
+    scenario = phonotaxis.load_scenario("default", {"duration_s": 0.5})
+    run = phonotaxis.simulate(
+        scenario, save_audio=tmp_path / "ears", movie=tmp_path / "run.gif"
+    )
+    assert {path.name for path in tmp_path.iterdir()} == {"ears", "run.gif"}
+    document = run.document()
+    assert document["movie"] == str(tmp_path / "run.gif")
+    assert document["audio"]["directory"] == str(tmp_path / "ears")
+    assert (tmp_path / "ears" / "heard.wav").is_file()
+    with pytest.raises(phonotaxis.InputError, match=r"save_audio: .*not empty"):
+        phonotaxis.simulate(scenario, save_audio=tmp_path / "ears")
 
 
 def test_a_run_is_saved_whole_and_once(run: phonotaxis.RunResult, tmp_path: Path):
@@ -137,14 +186,18 @@ def shown(page: Path) -> str:
     return re.sub("<.*?>", "", html.unescape(page.read_text("utf-8")))
 
 
-def test_warnings_are_in_all_that_a_run_gives(tmp_path: Path):
+def test_warnings_are_in_all_that_a_run_gives(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
     settings = {
         **WARNED, "obstacles": [CART | {"speed_m_s": 2.0, "acceleration_m_s2": 0.9}]
     }  # fmt: skip
     run = phonotaxis.simulate(phonotaxis.load_scenario("obstacle_free", settings))
     told = [{"field": FIELD, "message": MESSAGE}]
     assert [asdict(each) for each in run.warnings] == told
-    assert run.summary()["warnings"] == told
+    assert run.document()["warnings"] == told
+    assert run.notes == (f"{FIELD}: {MESSAGE}",)
+    assert [record.getMessage() for record in caplog.records] == [*run.notes]
     out = run.save(tmp_path / "run")
     assert json.loads((out / "summary.json").read_text("utf-8"))["warnings"] == told
     for name in ("report.html", "replay.html"):
@@ -153,7 +206,7 @@ def test_warnings_are_in_all_that_a_run_gives(tmp_path: Path):
 
 def test_a_run_without_warnings_has_none(run: phonotaxis.RunResult, tmp_path: Path):
     assert run.warnings == ()
-    assert run.summary()["warnings"] == []
+    assert run.document()["warnings"] == []
     assert "Warning" not in shown(run.save(tmp_path / "run") / "report.html")
 
 
@@ -191,6 +244,12 @@ def test_a_sweep_gives_table_and_page(tmp_path: Path):
     assert found.table["law"].tolist() == ["none", "active"]
     assert "law active" in str(found)
     assert (found.out / "report.html").is_file()
+    assert found.save() == found.out
+    copy = found.save(tmp_path / "copy")
+    assert (copy / "report.html").read_bytes() == (
+        found.out / "report.html"
+    ).read_bytes()
+    assert list(found.plot()) == ["obstacle_free"]
 
 
 def test_a_sweep_counts_the_runs_with_warnings(tmp_path: Path):
@@ -205,10 +264,11 @@ def test_a_sweep_counts_the_runs_with_warnings(tmp_path: Path):
     told = [[], [{"field": FIELD, "message": MESSAGE}]]
     assert [json.loads(x) for x in found.table["warnings"]] == 2 * told
     counted = [{"field": FIELD, "runs": 2, "message": MESSAGE}]
-    assert found.summary["warnings"] == counted
-    assert [cell["warnings"] for cell in found.summary["cells"]] == [[], counted]
+    assert found.document()["warnings"] == counted
+    assert [cell["warnings"] for cell in found.document()["cells"]] == [[], counted]
     line = f"Warning in 2 of 4 runs: {FIELD}: {MESSAGE}"
     assert str(found).splitlines()[-1] == line
+    assert found.notes == (line,)
     page = shown(found.out / "report.html")
     assert line in page
     assert "with warnings" in page
@@ -226,7 +286,7 @@ def test_a_comparison_counts_the_runs_with_warnings(tmp_path: Path):
         workers=1,
     )
     counted = [{"field": FIELD, "runs": 2, "message": MESSAGE}]
-    assert [cell["warnings"] for cell in found.summary["cells"]] == [[], counted]
+    assert [cell["warnings"] for cell in found.document()["cells"]] == [[], counted]
     line = f"Warning in 2 of 4 runs: {FIELD}: {MESSAGE}"
     assert line in str(found).splitlines()
     assert line in shown(found.out / "report.html")
@@ -268,7 +328,7 @@ def test_stability_gives_findings_and_a_page(
 ):
     """The first parts alone: all of them take a minute."""
     monkeypatch.setattr(
-        report_parts, "parts_for", lambda _, full: report_parts.SOUND_PARTS[:2]
+        report_parts, "parts_for", lambda _: report_parts.SOUND_PARTS[:2]
     )
     told: list[str] = []
     for laws, names in (
@@ -290,18 +350,17 @@ def test_stability_warns_that_other_robots_are_left_out(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
     """As the command does."""
-    monkeypatch.setattr(report_parts, "parts_for", lambda _, full: [])
-    phonotaxis.stability("robots_2")
+    monkeypatch.setattr(report_parts, "parts_for", lambda _: [])
+    found = phonotaxis.stability("robots_2")
     phonotaxis.stability("robots_2", robot="second")
     phonotaxis.stability("unknown_block")
     first, second = (record.getMessage() for record in caplog.records)
     assert first.startswith("the report covers robot 'first' alone, without second; ")
+    assert found.notes == (first,)
     assert second == "the report covers robot 'second' alone, without first"
 
 
 def test_locate_takes_samples_and_files_alike(tmp_path: Path):
-    import soundfile
-
     places = [(0.0, 0.4), (0.0, 0.0), (0.0, -0.4)]
     times = np.arange(24_000) / 48_000.0
     noise = np.random.default_rng(2).uniform(-0.5, 0.5, 24_000)
@@ -311,13 +370,36 @@ def test_locate_takes_samples_and_files_alike(tmp_path: Path):
     (tmp_path / "array.yaml").write_text(f"microphones: {[list(p) for p in places]}")
     by_file = phonotaxis.locate(tmp_path / "heard.wav", tmp_path / "array.yaml")
     by_samples = phonotaxis.locate(samples, places, sample_rate_hz=48_000)
-    assert by_samples.to_dict() == by_file.to_dict()
-    bearing = by_samples.summary()["bearing_deg"]
+    assert by_samples.document() == by_file.document()
+    bearing = by_samples.main_source()["bearing_deg"]
     assert bearing == pytest.approx(np.degrees(np.arctan2(1.0, 1.5)), abs=1.0)
     counts = np.round(samples * 32767.0).astype(np.int16)
     by_counts = phonotaxis.locate(counts, sample_rate_hz=48_000)
-    assert by_counts.summary()["bearing_deg"] == pytest.approx(bearing, abs=0.1)
+    assert by_counts.main_source()["bearing_deg"] == pytest.approx(bearing, abs=0.1)
     assert len(repr(by_counts)) < 100
+
+
+def test_listen_gives_the_bearings_of_a_file(tmp_path: Path):
+    sound = tmp_path / "heard.wav"
+    soundfile.write(sound, plane_waves(-120.0, 2.0).T, RATE)
+    steps: list[float] = []
+    found = phonotaxis.listen(
+        sound, SQUARE, step=lambda step: steps.append(step.sources.t_s)
+    )
+    assert steps[-1] == 2.0
+    assert set(found.table["source"]) == {1}
+    np.testing.assert_allclose(found.table["bearing_deg"], -120.0, atol=2.0)
+    assert str(found) == "the stream has ended; 2.0 s heard, sources: 1"
+    assert found.notes == ()
+    out = found.save(tmp_path / "out")
+    assert {path.name for path in out.iterdir()} == {
+        "listen.json", "listen.png", "tracks.csv"
+    }  # fmt: skip
+    assert json.loads((out / "listen.json").read_text()) == {
+        **found.document(), "out": str(out)
+    }  # fmt: skip
+    with pytest.raises(phonotaxis.InputError, match="channels: is 0"):
+        phonotaxis.listen(sound, SQUARE, channels=0)
 
 
 NOISE = np.random.default_rng(3).standard_normal((3, 9600))

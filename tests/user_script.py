@@ -24,7 +24,7 @@ def follow(folder: Path) -> list[Path]:
     assert_type(result.trajectory, pd.DataFrame)
     assert_type(result.cause, str)
     assert_type(result.plot(), Figure)
-    assert_type(result.summary(), dict[str, Any])
+    assert_type(result.document(), dict[str, Any])
     assert_type(phonotaxis.columns(result), pd.DataFrame)
     for own in result.robots.values():
         assert_type(own, phonotaxis.RunResult)
@@ -46,7 +46,7 @@ def hear() -> float | None:
     samples = np.array([np.interp(times - path, times, noise) for path in paths])
     result = phonotaxis.locate(samples, places, sample_rate_hz=48_000.0)
     assert_type(result, phonotaxis.LocateResult)
-    bearing = result.summary()["bearing_deg"]
+    bearing = result.main_source()["bearing_deg"]
     assert isinstance(bearing, float | None)
     return bearing
 

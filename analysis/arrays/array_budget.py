@@ -26,28 +26,6 @@ class ArrayBudget:
     delay_std: float
     """Standard deviation of the sampling times of each channel, s."""
 
-    @classmethod
-    def of(
-        cls,
-        shape: ArrayShape,
-        position_std: float,
-        speed_std: float = 0.0,
-        delay_std: float = 0.0,
-    ) -> ArrayBudget:
-        """Makes an error budget with equal position errors for all coordinates.
-
-        Args:
-            shape: The microphones.
-            position_std: Standard deviation of each coordinate of each microphone, m.
-            speed_std: Standard deviation of the speed of sound, m/s.
-            delay_std: Standard deviation of the sampling times of each channel, s.
-
-        Returns:
-            The standard deviations of all errors.
-        """
-        of_places = position_std**2 * np.eye(shape.p_AM.size)
-        return cls(of_places, speed_std, delay_std)
-
     @property
     def position_std(self) -> float:
         """Root mean square of the coordinates' standard deviations, m."""
@@ -56,19 +34,12 @@ class ArrayBudget:
     def delay_covariance(
         self, u: NDArray[np.float64], w: float, shape: ArrayShape, c: float
     ) -> NDArray[np.float64]:
-        """Computes the covariance of the delays t_k - t_0 from the errors of the array.
+        """Computes the (n - 1, n - 1) covariance of the delays t_k - t_0, s^2.
 
-        The computation is to first order. If a microphone is nearer to the source by a
-        length, the sound arrives earlier by this length divided by c.
-
-        Args:
-            u: (d,) unit vector from the centroid of the microphones to the source.
-            w: Inverse range of the source, 1/m; 0 for a distant source.
-            shape: The n microphones.
-            c: Speed of sound, m/s.
-
-        Returns:
-            (n - 1, n - 1) covariance of the delays, s^2.
+        The unit vector u points from the centroid of the microphones to the source. The
+        inverse range w is 0 for a distant source, 1/m. The computation is to first
+        order: if a microphone is nearer to the source by a length, the sound arrives
+        earlier by this length divided by c.
         """
         count, dimension = shape.p_AM.shape
         to_source = u - w * shape.p_AM
@@ -77,24 +48,13 @@ class ArrayBudget:
         slopes[np.arange(count), np.arange(count)] = -to_source / c
         slopes = slopes[1:] - slopes[0]
         flat = slopes.reshape(count - 1, -1)
-        later = _arrivals(u, w, shape) / c
+        along = shape.p_AM @ u
+        square = np.sum(shape.p_AM**2, axis=1)
+        ratio = np.sqrt(np.maximum(1.0 - 2.0 * w * along + w * w * square, 0.0))
+        later = (w * square - 2.0 * along) / (ratio + 1.0) / c
         delays = later[1:] - later[0]
         return (
             flat @ self.of_places @ flat.T
             + (self.speed_std / c) ** 2 * np.outer(delays, delays)
             + self.delay_std**2 * (np.eye(count - 1) + 1.0)
         )
-
-
-def _arrivals(
-    u: NDArray[np.float64], w: float, shape: ArrayShape
-) -> NDArray[np.float64]:
-    """Computes how much farther from the source each microphone is than the centroid.
-
-    Returns:
-        (n,) differences of distance, m.
-    """
-    along = shape.p_AM @ u
-    square = np.sum(shape.p_AM**2, axis=1)
-    ratio = np.sqrt(np.maximum(1.0 - 2.0 * w * along + w * w * square, 0.0))
-    return (w * square - 2.0 * along) / (ratio + 1.0)

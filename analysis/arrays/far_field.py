@@ -29,23 +29,14 @@ def locate_far_source(
     *,
     inverse_range_std: float = 0.0,
 ) -> SourceFix:
-    """Estimates the direction of a distant source.
+    """Estimates the direction of a distant source from (n - 1,) delays t_k - t_0.
 
-    Args:
-        tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
-        covariance: (n - 1, n - 1) covariance of the delays, s^2.
-        shape: The n microphones.
-        c: Speed of sound, m/s.
-        tolerance: (n - 1, n - 1) covariance of further errors of the delays, s^2. The
-            further errors affect the weights of the delays and chi-square. They do not
-            affect the standard deviations of the result. None: no further errors.
-        inverse_range_std: Prior standard deviation of the inverse range, 1/m. It states
-            how uncertain it is that the waves are plane. If it is positive and the
-            delays do not determine the curvature, the standard deviations of the result
-            increase.
-
-    Returns:
-        The source without a range, on the side of ``shape.ahead``.
+    The matrix ``tolerance`` is the (n - 1, n - 1) covariance of further errors, s^2.
+    They affect the weights of the delays and chi-square, but not the standard
+    deviations of the result. The prior ``inverse_range_std``, 1/m, states how uncertain
+    it is that the waves are plane. If it is positive and the delays do not determine
+    the curvature, the standard deviations of the result increase. The result has no
+    range, and is on the side of ``shape.ahead``.
     """
     slopes = (shape.p_AM[0] - shape.p_AM[1:]) / c
     whole = covariance if tolerance is None else covariance + tolerance
@@ -57,7 +48,14 @@ def locate_far_source(
     gain = np.linalg.pinv(root @ slopes @ basis) @ root
     of_u = basis @ gain @ covariance @ gain.T @ basis.T
     if inverse_range_std > 0.0:
-        bend = _bend(u, root, slopes @ basis, shape, c, inverse_range_std)
+        # Compared with a plane wave, a wave front from the distance 1/w reaches a
+        # microphone at p later by w |p - (p . u) u|^2 / 2c.
+        square = np.sum(shape.p_AM**2, axis=1) - (shape.p_AM @ u) ** 2
+        curved = root @ (square[1:] - square[0]) / (2.0 * c)
+        within = root @ (slopes @ basis)
+        turned = np.linalg.pinv(within) @ curved
+        seen = curved - within @ turned
+        bend = turned / math.sqrt(float(seen @ seen) + inverse_range_std**-2)
         of_u += basis @ np.outer(bend, bend) @ basis.T
     residual = root @ (tau - slopes @ u)
     bearing_std, elevation, elevation_std = angles_of(u, of_u, shape)
@@ -75,39 +73,10 @@ def locate_far_source(
     )
 
 
-def _bend(
-    u: NDArray[np.float64],
-    root: NDArray[np.float64],
-    slopes: NDArray[np.float64],
-    shape: ArrayShape,
-    c: float,
-    inverse_range_std: float,
-) -> NDArray[np.float64]:
-    """Computes the error of the direction from an unknown curvature of the wave front.
-
-    Compared with a plane wave, a wave front from the distance 1/w reaches a microphone
-    at p later by w |p - (p . u) u|^2 / 2c.
-
-    Returns:
-        (k,) standard deviation of each coordinate of the direction.
-    """
-    square = np.sum(shape.p_AM**2, axis=1) - (shape.p_AM @ u) ** 2
-    curved = root @ (square[1:] - square[0]) / (2.0 * c)
-    within = root @ slopes
-    turned = np.linalg.pinv(within) @ curved
-    seen = curved - within @ turned
-    return np.asarray(turned / math.sqrt(float(seen @ seen) + inverse_range_std**-2))
-
-
 def _on_sphere(
     slopes: NDArray[np.float64], tau: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Finds the unit vector that best fits whitened delays.
-
-    Returns:
-        u: (d,) unit vector to the source.
-        basis: (d, d - 1) orthonormal vectors perpendicular to u.
-    """
+    """Returns the unit vector that best fits whitened delays, and a basis across it."""
     u = _least_squares(slopes, tau)
     u /= max(float(np.linalg.norm(u)), 1e-12)
     for _ in range(_STEPS):
@@ -121,13 +90,11 @@ def _on_sphere(
 def _off_array(
     slopes: NDArray[np.float64], tau: NDArray[np.float64], shape: ArrayShape
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Finds the unit vector that best fits whitened delays of a row or plane.
+    """Returns the unit vector that best fits whitened delays of a row or plane.
 
-    The component perpendicular to the row or plane follows from the unit length.
-
-    Returns:
-        u: (d,) unit vector to the source.
-        basis: (d, r) derivatives of u with respect to its r components along the array.
+    The component perpendicular to the row or plane follows from the unit length. The
+    other result contains the (d, r) derivatives of the vector with respect to its r
+    components along the array.
     """
     assert shape.ahead is not None
     span = shape.span

@@ -9,11 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from systems.delays.correlations import (
-    correlations_at_lags,
-    parabola_vertex,
-    whitening,
-)
+from systems.delays.correlations import correlations_at_lags, parabola_vertex, whitening
 
 # Number of frames to use. They are the loudest frames anywhere in the recording.
 _FRAMES = 64
@@ -70,15 +66,9 @@ def correlate_pairs(
 ) -> PairCorrelations | None:
     """Computes the peaks of the correlations of all pairs in the loudest frames.
 
-    Args:
-        samples: (n, samples) channels without NaN.
-        max_delay_s: Longest delay that sound can have, s. The search covers delays
-            three times as long, so that it also finds impossible delays.
-        sample_rate_hz: Sample rate, Hz.
-        band_hz: Lowest and highest frequency to use, Hz.
-
-    Returns:
-        The peaks of the correlations. None if the recording is too short or silent.
+    The (n, samples) channels have no NaN. The search covers three times the delay
+    ``max_delay_s``, so that it also finds impossible delays. The result is None if the
+    recording is too short or silent.
     """
     count, total = samples.shape
     crossing = max_delay_s * sample_rate_hz
@@ -107,8 +97,6 @@ def correlate_pairs(
         return None
     pairs = np.stack(np.triu_indices(count, 1), axis=1)
     values = [_correlation(spectra[i], spectra[j], gate) for i, j in pairs]
-    extremes = [_extremes(v, gate) for v in values]
-    at_highest, at_lowest = np.stack(extremes, axis=2)
     one = math.sqrt(math.log(2.0 * gate + 1.0) / bins)
     shared = [
         max(
@@ -119,8 +107,8 @@ def correlate_pairs(
     ]
     return PairCorrelations(
         pairs=pairs,
-        lag_of_highest=at_highest,
-        lag_of_lowest=at_lowest,
+        lag_of_highest=np.stack([_vertex(v) for v in values], axis=1) - gate,
+        lag_of_lowest=np.stack([_vertex(-v) for v in values], axis=1) - gate,
         pooled_highest=np.array([v.mean(axis=0).max() for v in values]),
         pooled_lowest=np.array([v.mean(axis=0).min() for v in values]),
         shared=np.array(shared),
@@ -144,14 +132,9 @@ def _correlation(
     return correlations_at_lags(share, band, grid, _DENSITY * gate) * (grid / 2.0)
 
 
-def _extremes(values: NDArray[np.float64], gate: int) -> NDArray[np.float64]:
-    """Returns the (2, f) lags of the largest and the smallest value, samples."""
-    return np.stack((_vertex(values), _vertex(-values))) / _DENSITY - gate
-
-
 def _vertex(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the position of the largest value of each row, refined by a parabola."""
+    """Returns the position of the largest value of each row, samples."""
     rows = np.arange(len(values))
     best = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
     left, top, right = (values[rows, best + k] for k in (-1, 0, 1))
-    return best + parabola_vertex(left, top, right)
+    return (best + parabola_vertex(left, top, right)) / _DENSITY

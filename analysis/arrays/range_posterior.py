@@ -77,20 +77,10 @@ def range_posterior(
 ) -> RangePosterior:
     """Estimates the range of a source, averaged over the unknown errors of the array.
 
-    Args:
-        tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
-        covariance: (n - 1, n - 1) covariance of the delays from noise and reflections,
-            s^2.
-        shape: The n microphones.
-        budget: Errors of the microphone positions, sampling times, and speed of sound.
-        c: Speed of sound, m/s.
-        start: First estimate of the source: a (d,) direction, its inverse range in 1/m,
-            and the standard deviation of the inverse range. More ranges are evaluated
-            around this estimate.
-        nearest_m: Least range, m.
-
-    Returns:
-        Mean and standard deviation of the range up to 30 m, and the direction.
+    The (n - 1,) delays t_k - t_0 have the covariance of noise and reflections, s^2. The
+    first estimate ``start`` is a (d,) direction, its inverse range, 1/m, and the
+    standard deviation of the inverse range. More ranges are evaluated around this
+    estimate. The ranges reach from ``nearest_m`` to 30 m.
     """
     u, w, w_std = start
     frame = (
@@ -113,8 +103,11 @@ def range_posterior(
     close = 1.0 / np.clip(w + w_std * _ABOUT, 1.0 / FARTHEST_M, 1.0 / nearest_m)
     ranges = np.unique(np.concatenate((ranges, close)))[::-1].copy()
     likelihood = _log_likelihood(kernel, frame.T @ u, ranges)
-    density = np.exp(likelihood - likelihood.max())
-    mean, std = _moments(ranges[::-1], density[::-1])
+    density, ranges = np.exp(likelihood - likelihood.max())[::-1], ranges[::-1]
+    whole = np.trapezoid(density, ranges)
+    mean = float(np.trapezoid(density * ranges, ranges) / whole)
+    variance = np.trapezoid(density * (ranges - mean) ** 2, ranges) / whole
+    std = float(np.sqrt(variance))
     a, of_p = _place(kernel, frame.T @ u, mean)
     direction = frame @ a
     along = float(direction @ of_p @ direction)
@@ -124,27 +117,16 @@ def range_posterior(
     return RangePosterior(mean, std, direction, stretch @ of_p @ stretch)
 
 
-def _moments(
-    ranges: NDArray[np.float64], density: NDArray[np.float64]
-) -> tuple[float, float]:
-    whole = np.trapezoid(density, ranges)
-    mean = float(np.trapezoid(density * ranges, ranges) / whole)
-    variance = np.trapezoid(density * (ranges - mean) ** 2, ranges) / whole
-    return mean, float(np.sqrt(variance))
-
-
 @njit(cache=True)
 def _delays(
     kernel: _Kernel, u: NDArray[np.float64], r: float
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]:  # pragma: no cover  (compiled)
-    """Computes the delays of a source at the distance r in the direction u.
+    """Computes the (n - 1,) delays of a source at the distance r in the direction u, s.
 
-    Returns:
-        tau: (n - 1,) delays, s.
-        slopes: (n - 1, d) derivatives of the delays with respect to the position, s/m.
-        whole: (n - 1, n - 1) covariance of all delay errors, s^2.
+    The other results are the (n - 1, d) derivatives of the delays with respect to the
+    position, and the (n - 1, n - 1) covariance of all delay errors.
     """
     n, d = kernel.p.shape
     rays = np.empty((n, d))
@@ -236,11 +218,9 @@ def _log_likelihood(
 def _place(
     kernel: _Kernel, a: NDArray[np.float64], r: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Finds the best direction at a range, and the error of the source position.
+    """Returns the best direction at a range along the axes ``kernel.frame``.
 
-    Returns:
-        a: (q,) unit vector to the source, along the axes ``kernel.frame``.
-        covariance: (d, d) covariance of the position, m^2.
+    The other result is the (d, d) covariance of the source position, m^2.
     """
     a, _ = _turned(kernel, a, r)
     _, slopes, whole = _delays(kernel, kernel.frame @ a, r)

@@ -17,8 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 from scipy.ndimage import maximum_filter1d
 
+from systems.delays.correlations import correlations_at_lags
 from systems.framework.compiling import njit
 from systems.hearing.source_fix import NEAREST_M
 from systems.sound.array_shape import ArrayShape
@@ -45,8 +47,8 @@ _OUTSIDE = 0.6
 # away.
 _TOO_NEAR = 0.1
 
-#: Samples of a correlation per period of the highest frequency.
-LAG_DENSITY = 16.0
+# Samples of a correlation per period of the highest frequency.
+_LAG_DENSITY = 16.0
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,8 @@ class SearchGrid:
     """(g,) inverse range of each position, 1/m; 0 for distant positions."""
     lags: NDArray[np.int32]
     """(g, p) column of each pair's correlation for each position."""
+    length: int
+    """Number of samples of a correlation that covers a whole window."""
     lag_rate_hz: float
     """Columns of a correlation per second of delay."""
     max_lag: int
@@ -73,24 +77,14 @@ class SearchGrid:
 
     @classmethod
     def of(
-        cls, shape: ArrayShape, c: float, high_hz: float, lag_rate_hz: float
+        cls, shape: ArrayShape, c: float, high_hz: float, window_s: float
     ) -> SearchGrid:
         """Makes a grid with all positions that the array can distinguish.
 
         If all microphones of a plane array are given by (x, y), the grid also contains
         distant positions above the plane. Their delays are shorter than those of any
-        position in the plane.
-
-        Args:
-            shape: The microphones.
-            c: Speed of sound, m/s.
-            high_hz: Highest frequency of the correlations, Hz.
-            lag_rate_hz: Columns of a correlation per second, about ``LAG_DENSITY``
-                times ``high_hz``.
-
-        Returns:
-            The g positions, and the column of each pair's correlation for each
-            position.
+        position in the plane. The rate ``lag_rate_hz`` is about ``LAG_DENSITY`` times
+        ``high_hz``.
         """
         path = _PATH_SHARE * c / high_hz
         coarseness = 1.0
@@ -99,6 +93,10 @@ class SearchGrid:
         while _count(shape, coarseness * path) > most:
             coarseness *= _COARSER
         places, inverse = _places(shape, coarseness * path)
+        length = int(
+            fft.next_fast_len(math.ceil(_LAG_DENSITY * high_hz * window_s), real=True)
+        )
+        lag_rate_hz = length / window_s
         first, second = shape.pairs.T
         later = centroid_delays(places, inverse, shape, c)
         delays = lag_rate_hz * (later[:, second] - later[:, first])
@@ -108,11 +106,24 @@ class SearchGrid:
             p_AS=places,
             inverse_range=inverse,
             lags=np.rint(delays).astype(np.int32) + max_lag,
+            length=length,
             lag_rate_hz=lag_rate_hz,
             max_lag=max_lag,
             blur=1 + 2 * np.rint(lag_rate_hz * missed / c).astype(np.int64),
             coarseness=coarseness,
         )
+
+    def correlations(
+        self, cross: NDArray[np.complex64], bins: slice, slack: int = 0
+    ) -> NDArray[np.float32]:
+        """Computes (p, 2 m + 1) correlations from the (p, f) cross-spectra of pairs.
+
+        The delay 0 is in column m, which is ``max_lag`` + ``slack``. The magnitudes of
+        each cross-spectrum add up to at most 1, so all values are between -1 and 1.
+        """
+        m = self.max_lag + slack
+        values = correlations_at_lags(cross, bins, self.length, m)
+        return values * np.float32(0.5 * self.length)
 
 
 def centroid_delays(
@@ -121,18 +132,10 @@ def centroid_delays(
     shape: ArrayShape,
     c: float,
 ) -> NDArray[np.float64]:
-    """Computes how much later sound arrives at each microphone than at their centroid.
+    """Returns how much later sound arrives at each microphone than at the centroid, s.
 
-    Args:
-        places: (g, d) source positions in the frame A of the array, m. Unit vectors for
-            infinitely distant sources.
-        inverse_range: (g,) inverse ranges, 1/m; 0 for infinitely distant sources.
-        shape: The n microphones.
-        c: Speed of sound, m/s.
-
-    Returns:
-        (g, n) delays, s. They are negative if the sound arrives at the microphone
-        first.
+    The delays have the shape (g, n). The (g, d) places are relative to the centroid, m.
+    Distant sources have the inverse range 0, and their places are unit vectors.
     """
     far = -places @ shape.p_AM.T
     ranges = np.linalg.norm(places, axis=1, keepdims=True)
@@ -169,7 +172,7 @@ class _Steps:
 
 
 def _count(shape: ArrayShape, path: float) -> float:
-    """Returns the approximate number of grid positions."""
+    """Returns the approximate number of grid positions, without making them."""
     steps = _Steps.of(shape, path)
     flat = len(_basis(shape)) == 2
     directions = 2.0 * math.pi / steps.angle if flat else 4.0 * math.pi / steps.angle**2
@@ -186,7 +189,6 @@ def _count(shape: ArrayShape, path: float) -> float:
 def _places(
     shape: ArrayShape, path: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns the grid positions and their inverse ranges."""
     steps = _Steps.of(shape, path)
     basis = _basis(shape)
     ahead = shape.ahead is not None
@@ -217,10 +219,7 @@ def _basis(shape: ArrayShape) -> NDArray[np.float64]:
 
 
 def _directions(dimension: int, step: float, *, ahead: bool) -> NDArray[np.float64]:
-    """Returns (g, dimension) unit vectors in all directions.
-
-    If ``ahead`` is true, these are only the vectors with a positive last component.
-    """
+    """Returns (g, dimension) unit vectors in all directions, or only those ahead."""
     if dimension == 2:
         angles = step * np.arange(math.ceil(2.0 * math.pi / step))
         unit = np.stack((np.cos(angles), np.sin(angles)), axis=1)
@@ -254,13 +253,8 @@ def steered_response(
 ) -> NDArray[np.float32]:
     """Computes the mean of the pairs' correlations at the delays of each grid position.
 
-    Args:
-        correlations: (p, 2 max_lag + 1) correlations at the rate ``grid.lag_rate_hz``.
-            Delay 0 is in the middle.
-        grid: Grid of g positions.
-
-    Returns:
-        (g,) responses in the unit of the correlations.
+    The (p, 2 max_lag + 1) correlations have the rate ``grid.lag_rate_hz``, with delay 0
+    in the middle.
     """
     if grid.coarseness > 1.0:
         correlations = np.stack(

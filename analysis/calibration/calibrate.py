@@ -6,17 +6,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
-from analysis.calibration.calibrated_geometry import calibrated_fields
 from analysis.calibration.calibration import Calibration, calibrate_array
 from analysis.calibration.calibration_misfit import (
     CalibrationMisfit,
     calibration_misfit,
 )
-from analysis.calibration.calibration_sounds import CalibrationSounds
-from analysis.calibration.measured_sound import MeasuredSound, check_position
+from analysis.calibration.calibration_sounds import (
+    CalibrationSounds,
+    MeasuredSound,
+    check_position,
+)
 from analysis.calibration.observability import (
     CalibrationGain,
     calibration_gains,
@@ -25,8 +28,10 @@ from analysis.calibration.observability import (
 from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.heard_sounds import HeardSound, heard_sound, sightings_of
 from analysis.recordings.recording_search import Sighting
+from diagrams.scenario.yaml_text import LARGEST_BYTES
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
+from systems.sound.array_shape import ArrayShape
 
 # Shortest usable wavelength, in standard deviations of the microphone positions. With
 # a shorter wave, one period may be mistaken for the next.
@@ -34,6 +39,25 @@ _DEVIATIONS_A_PERIOD = 5.0
 
 # Highest frequency used if the geometry file states no band, Hz.
 _USUAL_TOP_HZ = 15_000.0
+
+_Side = Literal["ahead", "behind", "above", "below"]
+
+# Fields that the calibration replaces.
+_REPLACED = frozenset(
+    {
+        "microphones",
+        "position_std_m",
+        "position_covariance_m2",
+        "sound_speed",
+        "sound_speed_std",
+        "temperature_c",
+        "temperature_std_c",
+    }
+)
+
+# _DIGITS: significant digits to try for a covariance, finest first.
+# _AROUND: characters of YAML that surround each number.
+_DIGITS, _AROUND = (17, 9), 8
 
 
 @dataclass(frozen=True)
@@ -52,28 +76,14 @@ class CalibrationRun:
     remarks: list[str] = field(default_factory=list)
     """Messages about recordings, such as a recording without detectable sound."""
 
-    @property
-    def gains_nothing(self) -> bool:
-        """Whether the sounds made nothing about the array better known."""
-        return gains_nothing(self.calibration)
-
 
 def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> CalibrationRun:
     """Calibrates an array from recordings that the array made.
 
     A first pass uses only frequencies that the stated position errors allow. If the
     first pass improves the array and fits, a second pass uses higher frequencies.
-
-    Args:
-        sounds: Recordings, with source positions where these are known.
-        geometry: The array, with its stated uncertainties.
-
-    Returns:
-        The calibrated array.
-
-    Raises:
-        InputError: A recording cannot be used, a source position is not plausible, or
-            no recording contains a detectable sound.
+    Raises ``InputError`` if a recording cannot be used, if a source position is not
+    plausible, or if no recording contains a detectable sound.
     """
     places = np.array(geometry.microphones)
     for k, listed in enumerate(sounds.sounds):
@@ -85,33 +95,23 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
     top_hz = _top_hz(
         geometry, float(np.sqrt(np.mean(np.diag(geometry.known.budget.of_places))))
     )
-    first = calibration_run(*_listened(sounds, geometry, geometry, top_hz))
-    if first.misfit is not None or first.gains_nothing or math.isinf(top_hz):
+    first = _pass(sounds, geometry, geometry, top_hz)
+    fits = first.misfit is None
+    if not fits or gains_nothing(first.calibration) or math.isinf(top_hz):
         return first
     # Better known microphone positions allow higher frequencies, which say more.
     known = ArrayGeometry.model_validate(calibrated_fields(first.calibration, geometry))
     top_hz = _top_hz(geometry, _shape_std(first))
-    return calibration_run(*_listened(sounds, geometry, known, top_hz))
+    return _pass(sounds, geometry, known, top_hz)
 
 
-def _listened(
+def _pass(
     sounds: CalibrationSounds,
     geometry: ArrayGeometry,
     known: ArrayGeometry,
     top_hz: float,
-) -> tuple[list[MeasuredSound], ArrayGeometry, list[HeardSound], list[str]]:
-    """Measures the delays in all recordings.
-
-    Args:
-        sounds: The recordings.
-        geometry: The array as stated.
-        known: The array as known so far, which is used to measure the delays.
-        top_hz: Highest frequency to use, Hz.
-
-    Returns:
-        Four values: the measured sounds; ``geometry``, unchanged; the results of the
-        recordings; messages about the recordings.
-    """
+) -> CalibrationRun:
+    """Calibrates the array from delays that are measured with the ``known`` array."""
     measured: list[MeasuredSound] = []
     heard: list[HeardSound] = []
     remarks: list[str] = []
@@ -128,33 +128,25 @@ def _listened(
                 f"{name}: of {sound.stretches} stretches {sound.used} agree; its "
                 "source moves, or there are other sources"
             )
-        place = listed.position_m
         heard.append(sound)
-        measured.append(
-            MeasuredSound(
-                sound.tau,
-                sound.covariance,
-                None if place is None else np.array(place),
-                listed.position_std_m,
-                name,
-            )
-        )
+        place, std = listed.position_m, listed.position_std_m
+        position = None if place is None else np.array(place)
+        measured.append(MeasuredSound(sound.tau, sound.covariance, position, std, name))
     if not measured:
         raise InputError(
             "sounds",
             "no recording has a detectable sound; record single loud sounds in a "
             "quiet place, and check the positions of the microphones (in m)",
         )
-    return measured, geometry, heard, remarks
+    return calibration_run(measured, geometry, heard, remarks)
 
 
 def _sightings(
     sounds: CalibrationSounds, k: int, known: ArrayGeometry, top_hz: float
 ) -> tuple[list[Sighting], list[str]]:
-    """Finds the parts of one recording that contain sound.
+    """Finds the parts of one recording that contain sound below ``top_hz``.
 
-    The search uses frequencies below ``top_hz``. If the recording is silent there, the
-    search uses all frequencies.
+    If the recording is silent there, the search uses all frequencies.
     """
     listed = sounds.sounds[k]
     path, part = sounds.path_of(listed), (listed.from_s, listed.to_s)
@@ -188,32 +180,52 @@ def calibration_run(
 ) -> CalibrationRun:
     """Calibrates an array from measured delays between microphones.
 
-    Args:
-        sounds: The delays, with source positions where these are known.
-        geometry: The array, with its stated uncertainties.
-        heard: Results of the recordings, one per sound. None: the delays do not come
-            from recordings.
-        remarks: Messages about the recordings.
-
-    Returns:
-        The calibrated array.
-
-    Raises:
-        InputError: The sounds do not match the array, for example in their number of
-            delays.
+    Raises ``InputError`` if the sounds do not match the array, for example in their
+    number of delays.
     """
-    calibration = calibrate_array(
-        np.array(geometry.microphones),
-        geometry.c,
-        geometry.known.budget,
-        sounds,
-        geometry.known.shape,
-    )
-    return CalibrationRun(
-        geometry,
-        calibration,
-        calibration_gains(calibration),
-        calibration_misfit(calibration),
-        heard or [],
-        remarks or [],
-    )
+    places, known = np.array(geometry.microphones), geometry.known
+    found = calibrate_array(places, geometry.c, known.budget, sounds, known.shape)
+    gains, misfit = calibration_gains(found), calibration_misfit(found)
+    return CalibrationRun(geometry, found, gains, misfit, heard or [], remarks or [])
+
+
+def calibrated_fields(
+    calibration: Calibration, geometry: ArrayGeometry
+) -> dict[str, Any]:
+    """Computes the fields of a geometry file for a calibrated array.
+
+    Fields that were not calibrated are copied from the array as stated. If the array is
+    too large for a covariance in the file, the file holds one standard deviation per
+    microphone. If the calibrated microphones no longer lie in a plane or line, the
+    field ``side`` is left out.
+    """
+    fields = {
+        "microphones": calibration.places.tolist(),
+        **_uncertainty(calibration),
+        "sound_speed": calibration.c,
+        "sound_speed_std": calibration.speed_std,
+    }
+    dropped = set(_REPLACED)
+    if geometry.side is not None and not _has_side(calibration, geometry.side):
+        dropped.add("side")
+    kept = geometry.model_dump(mode="json", exclude_none=True, exclude=dropped)
+    return {**fields, **kept}
+
+
+def _has_side(calibration: Calibration, side: _Side) -> bool:
+    try:
+        ArrayShape.of(calibration.places).facing(side)
+    except InputError:
+        return False
+    return True
+
+
+def _uncertainty(calibration: Calibration) -> dict[str, Any]:
+    covariance = calibration.of_places
+    symmetric = (covariance + covariance.T) / 2.0
+    for digits in _DIGITS:
+        if covariance.size * (digits + _AROUND) < LARGEST_BYTES:
+            rows = [[float(f"{x:.{digits}g}") for x in row] for row in symmetric]
+            return {"position_covariance_m2": rows}
+    variances = np.diag(covariance).reshape(calibration.places.shape)
+    return {"position_std_m": np.sqrt(variances.mean(axis=1)).tolist()}

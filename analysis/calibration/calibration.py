@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_budget import ArrayBudget
-from analysis.calibration.array_unknowns import ArrayUnknowns
-from analysis.calibration.measured_sound import MeasuredSound, check_sounds
-from analysis.calibration.sound_places import SoundPlace
+from analysis.calibration.calibration_sounds import MeasuredSound, check_sounds
+from analysis.calibration.unknowns import ArrayUnknowns, SoundPlace
 from systems.hearing.multilateration import whitening_matrix
 from systems.sound.array_shape import ArrayShape
 
@@ -63,10 +62,8 @@ class Calibration:
     channel_delays: NDArray[np.float64]
     """(n,) delays of the channels minus their mean, s."""
     covariance: NDArray[np.float64]
-    """(n d + 1 + n, n d + 1 + n) joint covariance.
-
-    The order is microphone coordinates, speed of sound, channel delays.
-    """
+    """(n d + 1 + n, n d + 1 + n) joint covariance of microphone coordinates, speed of
+    sound and channel delays, in this order."""
     information: NDArray[np.float64]
     """(m, m) Fisher information of the sounds on the scaled unknowns z."""
     z: NDArray[np.float64]
@@ -105,26 +102,14 @@ def calibrate_array(
     sounds: Sequence[MeasuredSound],
     shape: ArrayShape | None = None,
 ) -> Calibration:
-    """Estimates microphone positions, speed of sound and channel delays.
+    """Estimates microphone positions, speed of sound, and channel delays.
 
-    If sounds have stated positions, these and the stated microphone positions together
-    define the coordinate frame, weighted by their uncertainties. If no sound has a
-    stated position, the stated microphone positions define the frame.
-
-    Args:
-        places: (n, d) stated microphone positions, m.
-        c: Stated speed of sound, m/s.
-        budget: Stated uncertainties of positions, speed of sound and delays.
-        sounds: The measured sounds.
-        shape: Array of the same positions that faces the sources without stated
-            positions. None: built from ``places``.
-
-    Returns:
-        The calibrated array, with its covariance.
-
-    Raises:
-        InputError: The sounds do not match the array, or all uncertainties are stated
-            as 0.
+    If sounds have stated positions, these and the stated (n, d) microphone positions
+    ``places`` together define the coordinate frame, weighted by their uncertainties.
+    Otherwise, the stated microphone positions define the frame. ``shape`` has the same
+    positions and faces the sources without stated positions. By default, it is built
+    from ``places``. Raises ``InputError`` if the sounds do not match the array, or if
+    all uncertainties are stated as 0.
     """
     places = np.asarray(places, dtype=np.float64)
     check_sounds(places, sounds)
@@ -226,15 +211,11 @@ def _information(fits: Sequence[Fit], size: int) -> NDArray[np.float64]:
 def _eliminated(
     fit: Fit, damping: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Eliminates the unknown coordinates of a sound from its delays.
+    """Eliminates the d unknown coordinates of a sound from its delays.
 
-    Returns:
-        Three arrays:
-
-        1. (n - 1, n - 1) weight of the residuals.
-        2. (d, n - 1) gain from the residuals to the best step of the sound's
-           coordinates.
-        3. (d,) step toward the expected coordinates.
+    Returns the (n - 1, n - 1) weight of the residuals, the (d, n - 1) gain from
+    residuals to the best step of the coordinates, and the (d,) step toward the expected
+    coordinates.
     """
     within = fit.by_place.T @ fit.by_place
     along = np.diag(within)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from analysis.arrays.wave_fronts import wave_front
 from analysis.calibration.calibration import Calibration, Fit, place_weight
-from analysis.calibration.wave_fronts import wave_front
 
 # The fit is rejected if chance exceeds its chi-square with less than this probability.
 _CHANCE = 1e-3
@@ -19,12 +19,14 @@ _CHANCE = 1e-3
 # Eigenvalues below this share of a matrix's largest eigenvalue count as 0.
 _ROUNDING = 1e-9
 
+_Kind = Literal["sound", "microphone", "channel"]
+
 
 @dataclass(frozen=True)
 class CalibrationMisfit:
     """The likeliest fault of a calibration that does not fit."""
 
-    kind: Literal["sound", "microphone", "channel"]
+    kind: _Kind
     """What is at fault: a sound, a microphone's position or a channel's delay."""
     index: int
     """Index of the faulty sound, microphone or channel, from 0."""
@@ -44,13 +46,8 @@ def calibration_misfit(calibration: Calibration) -> CalibrationMisfit | None:
 
     The function compares three kinds of candidates: one sound is left out, the position
     of one microphone is free, or the delay of one channel is free. The change of
-    chi-square is computed to first order about the solution.
-
-    Args:
-        calibration: The calibration.
-
-    Returns:
-        The candidate that fits best. None if everything fits without a change.
+    chi-square is computed to first order about the solution. Returns None if everything
+    fits without a change.
     """
     whole, freedom = calibration.chi_square, calibration.freedom
     if freedom < 1 or chi2.sf(whole, freedom) > _CHANCE:
@@ -72,32 +69,28 @@ def _by_channel(
     calibration: Calibration, covariance: NDArray[np.float64]
 ) -> list[CalibrationMisfit]:
     """Frees the position of each microphone, and the delay of each channel, in turn."""
-    count, dimension = calibration.places.shape
+    fits, (count, dimension) = calibration.fits, calibration.places.shape
+    about = calibration.places - calibration.unknowns.origin
+    fronts = [wave_front(about, calibration.c, f.place.h, f.place.w) for f in fits]
+    moves = [f.root @ front.by_places for f, front in zip(fits, fronts, strict=True)]
     late = np.eye(count)[1:] - np.eye(count)[0]
     found = []
     for k in range(count):
         own = slice(k * dimension, (k + 1) * dimension)
-        moves = [_moves(calibration, fit)[:, own] for fit in calibration.fits]
-        delays = [fit.root @ late[:, k : k + 1] for fit in calibration.fits]
-        drop = _drop_of(calibration.fits, moves, covariance)
-        left, freedom = calibration.chi_square - drop, calibration.freedom - dimension
-        found.append(CalibrationMisfit("microphone", k, max(left, 0.0), freedom))
-        left = calibration.chi_square - _drop_of(calibration.fits, delays, covariance)
-        freedom = calibration.freedom - 1
-        found.append(CalibrationMisfit("channel", k, max(left, 0.0), freedom))
+        free: dict[_Kind, list[NDArray[np.float64]]] = {
+            "microphone": [move[:, own] for move in moves],
+            "channel": [fit.root @ late[:, k : k + 1] for fit in fits],
+        }
+        for kind, columns in free.items():
+            left = calibration.chi_square - _drop_of(fits, columns, covariance)
+            freedom = calibration.freedom - columns[0].shape[1]
+            found.append(CalibrationMisfit(kind, k, max(left, 0.0), freedom))
     return found
 
 
 def _left(fit: Fit) -> NDArray[np.float64]:
     """(n - 1,) residual about the expected source position, in standard deviations."""
     return fit.residual + fit.by_place @ (fit.place.weights * fit.place.off)
-
-
-def _moves(calibration: Calibration, fit: Fit) -> NDArray[np.float64]:
-    """(n - 1, n d) slopes along microphone coordinates, standard deviations per m."""
-    about = calibration.places - calibration.unknowns.origin
-    front = wave_front(about, calibration.c, fit.place.h, fit.place.w)
-    return fit.root @ front.by_places
 
 
 def _without_sound(fit: Fit, covariance: NDArray[np.float64]) -> tuple[float, int]:
@@ -120,13 +113,7 @@ def _drop_of(
 ) -> float:
     """Computes how much chi-square falls if f more parameters are free.
 
-    Args:
-        fits: Fits of the sounds.
-        columns: (n - 1, f) slopes of each sound's delays along the parameters.
-        covariance: (m, m) covariance of the unknowns.
-
-    Returns:
-        The decrease of chi-square.
+    ``columns`` has (n - 1, f) slopes of each sound's delays along the parameters.
     """
     free = columns[0].shape[1]
     pull, own = np.zeros(free), np.zeros((free, free))

@@ -1,17 +1,22 @@
-"""Formats a calibration as text for a terminal, and as a JSON document."""
+"""Formats a calibration as text and as a JSON document, and writes its files."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.calibration.calibrate import CalibrationRun
-from analysis.calibration.calibrated_geometry import calibrated_fields
-from analysis.calibration.observability import CalibrationGain, gain_ratios
-from analysis.reporting.plain_values import plain
+from analysis.calibration.calibrate import CalibrationRun, calibrated_fields
+from analysis.calibration.observability import (
+    CalibrationGain,
+    gain_ratios,
+    gains_nothing,
+)
+from analysis.reporting.plain_values import plain, write_json
+from diagrams.scenario.yaml_text import dump_yaml
 
 # Most independent directions that a document lists.
 _MOST_DIRECTIONS = 32
@@ -41,16 +46,17 @@ def calibration_text(run: CalibrationRun) -> str:
     known = sum(sound.position is not None for sound in calibration.sounds)
     heard = f"{len(calibration.sounds)} sounds, {known} of them at stated positions"
     lines = [f"{heard}, and {count} microphones"]
-    if run.gains_nothing:
+    nothing = gains_nothing(calibration)
+    if nothing:
         text = _NOTHING_KNOWN if known else _NOTHING
         lines.append(text.format(delays=count - 1, unknowns=dimension))
     for verdict in ("observable", "in part", "not observable"):
         told = [gain for gain in run.gains if gain.verdict == verdict]
         lines += [f"{verdict}: {_gain_text(run, gain)}" for gain in told]
     lines.append(_fit_text(run))
-    if not calibration.settled and not run.gains_nothing:
+    if not calibration.settled and not nothing:
         lines.append("the search did not converge: do not rely on these numbers")
-    if not run.gains_nothing:
+    if not nothing:
         lines += ["", f"speed of sound {calibration.c:.2f} m/s", *_places(run)]
     return "\n".join([*lines, "", *_sounds(run)])
 
@@ -65,7 +71,7 @@ def calibration_document(run: CalibrationRun) -> dict[str, Any]:
         "schema_version": 1,
         "geometry": plain(calibrated_fields(calibration, run.geometry)),
         "stated": plain(run.geometry),
-        "gains_nothing": run.gains_nothing,
+        "gains_nothing": gains_nothing(calibration),
         "gains": [
             {**plain(gain), "ratio": gain.ratio, "verdict": gain.verdict}
             for gain in run.gains
@@ -84,6 +90,13 @@ def calibration_document(run: CalibrationRun) -> dict[str, Any]:
         "sounds": [_sound(run, j) for j in range(len(calibration.sounds))],
         "remarks": run.remarks,
     }
+
+
+def write_calibration(document: dict[str, Any], folder: Path) -> None:
+    """Writes ``calibration.json``, and ``array.yaml`` for ``load_geometry``."""
+    write_json(document, folder / "calibration.json")
+    text = dump_yaml(document["geometry"])
+    (folder / "array.yaml").write_text(text, encoding="utf-8")
 
 
 def _gain_text(run: CalibrationRun, gain: CalibrationGain) -> str:

@@ -50,18 +50,12 @@ class CalibrationGain:
 def gain_ratios(
     calibration: Calibration,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Finds independent directions of the unknowns, ordered by improvement.
+    """Finds m independent directions of the unknowns, ordered by improvement.
 
-    Args:
-        calibration: A calibration with m unknowns.
-
-    Returns:
-        Two arrays:
-
-        1. (m,) ratios, ascending. A ratio is the standard deviation after the
-           calibration over the standard deviation before.
-        2. (n d + 1 + n, m) directions as columns. A column is the change of positions,
-           speed of sound and delays for one standard deviation before.
+    Returns (m,) ascending ratios of the standard deviations after and before
+    calibration, and the directions as columns of an (n d + 1 + n, m) matrix. A column
+    is the change of positions, speed of sound and delays for one standard deviation
+    before.
     """
     seen, axes = np.linalg.eigh(calibration.information)
     ratios = 1.0 / np.sqrt(1.0 + np.maximum(seen[::-1], 0.0))
@@ -76,19 +70,9 @@ def gains_nothing(calibration: Calibration) -> bool:
 def calibration_gains(calibration: Calibration) -> list[CalibrationGain]:
     """Lists how well each property of the array is known before and after calibration.
 
-    The properties are:
-
-    - the speed of sound;
-    - the microphone positions as a whole;
-    - shifts, rotations and size of the whole array;
-    - the remaining shape of the array;
-    - the delays of the channels.
-
-    Args:
-        calibration: The calibration.
-
-    Returns:
-        One entry per property. Properties that were exact before are left out.
+    The properties are the speed of sound; the microphone positions as a whole; shifts,
+    rotations and size of the whole array; the remaining shape of the array; and the
+    delays of the channels. Properties that were exact before are left out.
     """
     before = calibration.unknowns.prior_covariance
     after = calibration.covariance
@@ -125,9 +109,8 @@ def _modes(
 ) -> list[tuple[str, str, NDArray[np.float64]]]:
     """Lists the independent shifts, rotations and size changes of an array.
 
-    Each mode has a name, a unit and (n d,) displacements to first order. The
-    displacements belong to a shift by 1 m, to a rotation by 1 rad, or to doubling the
-    array's size.
+    Each mode has a name, a unit and (n d,) displacements to first order for a shift by
+    1 m, a rotation by 1 rad, or twice the size.
     """
     count, dimension = places.shape
     p = places - places.mean(axis=0)

@@ -8,7 +8,7 @@ control point p with velocity v. Its energy is
 The second term is the attraction to the follow distance d_f from the source at p_S.
 U(c) is the energy of the repulsion at distance c from the bodies. V cannot grow if the
 damping D_r covers the velocity term of the law
-(``analysis.nonlinear.velocity_passivity``). The clamp of |v| to v_max only removes
+(``analysis.certificates.velocity_passivity``). The clamp of |v| to v_max only removes
 energy.
 
 For each body, E(p) is the lowest energy level over which any path from p to contact
@@ -36,12 +36,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import binary_propagation
 
 from analysis.certificates.escape_levels import border_cells, cell_bounds, climb
-from analysis.models.ideal_scenarios import moving_bodies
-from analysis.models.point_mass import PointMass, VelocityTermModel, point_mass
-from analysis.nonlinear.velocity_passivity import (
+from analysis.certificates.velocity_passivity import (
     VelocityTermPassivity,
     velocity_term_passivity,
 )
+from analysis.models.ideal_scenarios import moving_bodies
+from analysis.models.point_mass import PointMass, VelocityTermModel, point_mass
 from diagrams import Scenario
 from systems.framework.input_error import InputError
 

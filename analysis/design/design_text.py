@@ -89,26 +89,21 @@ def _check_text(check: Check) -> str:
     return f"{check.name:<26}{value:8.3f} {sign} {check.bound:.3f}{unit}{told}"
 
 
-def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
-    """Returns the JSON document of the design.
+def design_document(study: DesignStudy) -> dict[str, Any]:
+    """Returns the JSON document of the design, from plain values.
 
-    Args:
-        study: The result of the design.
-        out: The result directory, whose name is written into the document.
-
-    Returns:
-        Plain values that can be written as JSON.
+    The key ``out`` is None until the files of the design have a directory.
     """
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": study.today.scenario.name,
         **plain(study),
         "versions": versions(),
-        "out": str(out),
+        "out": None,
     }
 
 
-def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -> None:
+def write_design(study: DesignStudy, document: dict[str, Any], directory: Path) -> None:
     """Writes the files of a design into a directory.
 
     - ``summary.json`` is the JSON document.
@@ -119,7 +114,7 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
 
     Args:
         study: The result of the design.
-        summary: The JSON document from ``design_summary``.
+        document: The JSON document from ``design_document``.
         directory: An existing directory.
     """
     from analysis.design.design_plots import plot_design
@@ -127,7 +122,7 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
     from analysis.laws.law_curves_plots import plot_law_curves
     from analysis.laws.push_and_pull import DESIGNED_LAWS
 
-    write_json(summary, directory / "summary.json")
+    write_json(document, directory / "summary.json")
     for name, alternative in (
         ("scenario", study.today),
         ("recommended", study.recommended),

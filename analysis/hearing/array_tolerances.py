@@ -25,16 +25,9 @@ class ArrayTolerances(NamedTuple):
 def draw_errors(
     tolerances: ArrayTolerances, count: int, generator: Generator
 ) -> tuple[ChannelErrors, float]:
-    """Draws the errors of one array, uniformly distributed within its tolerances.
+    """Draws errors of an array of ``count`` microphones, uniform within tolerances.
 
-    Args:
-        tolerances: Largest errors.
-        count: Number of microphones n.
-        generator: Source of the random numbers.
-
-    Returns:
-        Errors of n positions, delays, and gains; and true speed of sound divided by the
-        assumed one.
+    The second result is the true speed of sound divided by the assumed one.
     """
     places = generator.uniform(-1.0, 1.0, (count, 2))
     delays = generator.uniform(-1.0, 1.0, count)

@@ -49,18 +49,11 @@ class SlopeEnergy:
     def of(
         cls, samples: ArrayLike, sample_rate_hz: float, start_time: float = 0.0
     ) -> SlopeEnergy:
-        """Integrates the squared slope of a sound, from its samples.
+        """Integrates the squared slope of a sound, from its (n,) samples in Pa at 1 m.
 
         The slope is that of the band-limited signal through the samples. The samples
-        should begin and end near zero, or form a full period.
-
-        Args:
-            samples: (n,) sound pressure at 1 m, Pa.
-            sample_rate_hz: Sample rate, Hz.
-            start_time: Time at which the first sample left the source, s.
-
-        Returns:
-            Integral of the squared slope up to each sample, Pa^2/s.
+        should begin and end near zero, or form a full period. The first sample leaves
+        the source at ``start_time``, s.
         """
         x = np.asarray(samples, dtype=float)
         omega = 2.0 * math.pi * sample_rate_hz * fft.rfftfreq(len(x))
@@ -115,17 +108,10 @@ def arrival_information(
 ) -> NDArray[np.float64]:
     """Computes the Fisher information of a frame on the arrival times of its sound.
 
-    Args:
-        energy: Slope energy of the sound.
-        begin: Time of the frame's first sample, s.
-        end: Time one sample after the frame's last sample, s.
-        travel: (n,) travel times from the source to the microphones, s.
-        weights: (n,) sample rate times g_m, with g_m as in the module docstring,
-            1/(Pa^2 s).
-
-    Returns:
-        (n, n) Fisher information, 1/s^2. A common shift of all times has no
-        information.
+    The frame lasts from its first sample at ``begin`` to one sample after its last at
+    ``end``. ``travel`` has the (n,) travel times to the microphones. ``weights`` has
+    the (n,) products of the sample rate and g_m from the module docstring, 1/(Pa^2 s).
+    The result is (n, n), 1/s^2. A common shift of all times has no information.
     """
     travel, weights = np.asarray(travel), np.asarray(weights)
     edges = np.sort(np.concatenate((begin - travel, end - travel)))
@@ -153,23 +139,12 @@ def position_bound(
 ) -> LocalizationBound:
     """Computes the Cramer-Rao bound of a source's position from one frame.
 
-    Source and microphones are at rest. Bearing and range are seen from the origin,
-    which should be the microphones' centroid.
-
-    Args:
-        energy: Slope energy of the sound.
-        begin: Time of the frame's first sample, s.
-        end: Time one sample after the frame's last sample, s.
-        p_AS: (d,) position of the source, m.
-        p_AM: (n, d) positions of the microphones, m.
-        noise_pa: RMS of the noise from 0 to half the sample rate, Pa. Either (n,), or
-            one value for all channels.
-        sample_rate_hz: Sample rate of the microphones, Hz.
-        c: Speed of sound, m/s.
-
-    Returns:
-        Least covariances and standard deviations. If the frame does not determine the
-        position, they are infinite.
+    Source and microphones are at rest, at (d,) p_AS and (n, d) p_AM, m. The frame lasts
+    from its first sample at ``begin`` to one sample after its last at ``end``, s.
+    ``noise_pa`` is the RMS of the noise from 0 to half the sample rate, either (n,), or
+    one value for all channels. Bearing and range are seen from the origin, which should
+    be the microphones' centroid. If the frame does not determine the position, the
+    covariances and standard deviations are infinite.
     """
     p_AS, p_AM = np.asarray(p_AS, dtype=float), np.asarray(p_AM, dtype=float)
     rays = p_AS - p_AM
@@ -200,15 +175,7 @@ def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def polar_point(range_m: float, bearing_deg: float) -> NDArray[np.float64]:
-    """Converts range and bearing to a point in the plane.
-
-    Args:
-        range_m: Distance from the origin, m.
-        bearing_deg: Angle from the x axis, deg.
-
-    Returns:
-        (2,) coordinates, m.
-    """
+    """Converts range and bearing from the x axis to a (2,) point in the plane, m."""
     angle = math.radians(bearing_deg)
     return range_m * np.array([math.cos(angle), math.sin(angle)])
 

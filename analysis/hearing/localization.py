@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.hearing.array_tolerances import ArrayTolerances
-from analysis.hearing.listening import Heard, Listener
+from analysis.hearing.listener import Heard, Listener
 from analysis.hearing.paper_tables import PAPER_CELLS, PaperCell
 from analysis.hearing.sensitivity import ArrayErrors, PolarStd, predicted_std
 from analysis.hearing.trial_counts import check_trials
@@ -112,12 +112,11 @@ def _moments(
 ) -> dict[str, float | None]:
     """Computes mean, standard deviation and RMS error; None for too few values."""
     some, several = len(values) > 0, len(values) > 1
+    rmse = float(np.sqrt(np.mean((values - truth) ** 2))) if some else None
     return {
         f"{name}_mean_{unit}": float(values.mean()) if some else None,
         f"{name}_std_{unit}": float(values.std(ddof=1)) if several else None,
-        f"{name}_rmse_{unit}": float(np.sqrt(np.mean((values - truth) ** 2)))
-        if some
-        else None,
+        f"{name}_rmse_{unit}": rmse,
     }
 
 
@@ -162,16 +161,9 @@ class LocalizationExperiment:
         """Runs the experiment: all positions of the source, with every estimator.
 
         The errors of the array are redrawn within their tolerances for every
-        measurement. All estimators get the same errors, sound and noise.
-
-        Args:
-            progress: Called with the number of measurements so far.
-
-        Returns:
-            Results sorted by position, then by estimator.
-
-        Raises:
-            InputError: The sound cannot be played.
+        measurement. All estimators get the same errors, sound and noise. ``progress``
+        is called with the number of measurements so far. The results are sorted by
+        position, then by estimator.
         """
         listeners = [
             (name, Listener(_with_estimator(self.scenario, name)))
@@ -206,16 +198,8 @@ def prepare_localization(
 ) -> LocalizationExperiment:
     """Prepares the localization experiment in the default scenario.
 
-    Args:
-        overrides: Changes of the scenario, as for ``load_scenario``.
-        trials: Number of measurements per position of the source and estimator.
-        tolerances: Whether the array has errors within ``REALISTIC_TOLERANCES``.
-
-    Returns:
-        The experiment, ready to run.
-
-    Raises:
-        InputError: An override, or the number of trials, is wrong.
+    If ``tolerances`` is true, the array has errors within ``REALISTIC_TOLERANCES``.
+    Raises ``InputError`` if an override, or the number of trials, is wrong.
     """
     check_trials(trials)
     return LocalizationExperiment(

@@ -32,17 +32,14 @@ _X_M, _Y_M = (-0.35, 5.05), (-0.95, 4.3)
 
 
 def plot_localization(cells: Sequence[LocalizationCell]) -> Figure:
-    """Plots two maps of the estimates, in axes of the robot frame B, m.
+    """Plots two maps of the estimates about the microphones' centroid, in B axes, m.
 
-    The origin of both maps is the microphones' centroid.
-
-    - The left map is to scale. It shows the estimates of Han 2019, as means with two
-      standard deviations of range and bearing. The left map also shows each estimator's
-      estimates.
+    - The left map is to scale. It shows each estimator's estimates, and those of Han
+      2019, as means with two standard deviations of range and bearing.
     - The right map shows ellipses of two standard deviations about each estimator's
       mean, and those of the Cramer-Rao bound. The ellipses are exaggerated along and
-      across the line of sight. The exaggeration factors are written at each distance.
-      The right map leaves out the papers' estimator, whose errors do not form ellipses.
+      across the line of sight, by factors that are written at each distance. The
+      papers' estimator is left out, because its errors do not form ellipses.
     """
     figure = Figure(figsize=(13.0, 7.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
@@ -96,9 +93,9 @@ def _to_scale(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
         )
         label = None
     for name, group in _by_estimator(cells).items():
-        colour, title = _STYLES[name]
+        color, title = _STYLES[name]
         found = np.concatenate([cell.heard.positions for cell in group])
-        axes.plot(*found.T, ".", markersize=3, color=colour, alpha=0.5, label=title)
+        axes.plot(*found.T, ".", markersize=3, color=color, alpha=0.5, label=title)
 
 
 def _exaggerated(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
@@ -118,21 +115,21 @@ def _exaggerated(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
         for cell in ring:
             _spread(axes, cell, factors)
     titles = [_STYLES[name] for name in _by_estimator(drawn)]
-    for colour, title in titles:
-        axes.plot([], [], color=colour, label=title)
+    for color, title in titles:
+        axes.plot([], [], color=color, label=title)
     axes.plot([], [], "--", color=COLOURS["source"], label="Cramer-Rao bound")
 
 
 def _spread(axes: Axes, cell: LocalizationCell, factors: NDArray[np.float64]) -> None:
     """Draws estimates about their mean, their ellipse, and the bound's ellipse."""
-    colour = _STYLES[cell.estimator][0]
+    color = _STYLES[cell.estimator][0]
     truth, turn = _truth(cell), _along_and_across(cell)
     stretch = turn.T @ np.diag(factors) @ turn
     positions = cell.heard.positions
     about_mean = truth + (positions - positions.mean(axis=0)) @ stretch.T
-    axes.plot(*about_mean.T, ".", markersize=1.5, color=colour, alpha=0.35)
+    axes.plot(*about_mean.T, ".", markersize=1.5, color=color, alpha=0.35)
     for covariance, line, edge in (
-        (np.cov(positions.T), "-", colour),
+        (np.cov(positions.T), "-", color),
         (cell.heard.bound.covariance, "--", COLOURS["source"]),
     ):
         ellipse = _ellipse(truth, stretch @ covariance @ stretch.T)
@@ -148,10 +145,9 @@ def _along_and_across(cell: LocalizationCell) -> NDArray[np.float64]:
 
 
 def _factors(cells: Sequence[LocalizationCell]) -> NDArray[np.float64]:
-    """(2,) exaggeration factors of the ellipses, along and across the line of sight.
+    """(2,) exaggeration factors of ellipses, along and across the line of sight.
 
-    The factors are chosen such that the largest ellipse at one distance has the half
-    axes ``_ROOM_M``, or slightly shorter ones.
+    The largest ellipse at one distance gets half axes of ``_ROOM_M`` or slightly less.
     """
     stds = [(c.heard.positions @ _along_and_across(c).T).std(axis=0) for c in cells]
     wanted = np.array(_ROOM_M) / np.maximum(_SIGMAS * np.max(stds, axis=0), 1e-9)
@@ -164,12 +160,12 @@ def _nice(value: float) -> float:
     return next(k * power for k in (5.0, 2.0, 1.0) if k * power <= value)
 
 
-def _ellipse(centre: NDArray[np.float64], covariance: NDArray[np.float64]) -> Ellipse:
+def _ellipse(center: NDArray[np.float64], covariance: NDArray[np.float64]) -> Ellipse:
     values, vectors = np.linalg.eigh(covariance)
     width, height = 2.0 * _SIGMAS * np.sqrt(np.maximum(values, 0.0))
     angle = math.degrees(math.atan2(vectors[1, 0], vectors[0, 0]))
     return Ellipse(
-        (float(centre[0]), float(centre[1])), width, height, angle=angle, fill=False
+        (float(center[0]), float(center[1])), width, height, angle=angle, fill=False
     )
 
 

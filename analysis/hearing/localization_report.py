@@ -7,9 +7,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from analysis.hearing.free_field import frame_estimator
 from analysis.hearing.localization import LocalizationCell, LocalizationExperiment
 from analysis.hearing.sensitivity import sensitivity_table
+from analysis.hearing.single_frames import frame_estimator
 from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import write_scenario
@@ -22,20 +22,13 @@ _ERROR_NAMES = {
 }
 
 
-def localization_summary(
+def localization_document(
     experiment: LocalizationExperiment,
     cells: Sequence[LocalizationCell],
-    out: Path | None,
 ) -> dict[str, Any]:
     """Builds the JSON document of the localization experiment.
 
-    Args:
-        experiment: The experiment.
-        cells: Results, one per position of the source and estimator.
-        out: Name of the result directory in the document. None: no directory.
-
-    Returns:
-        Plain values for JSON.
+    ``out`` is None until the files have a directory.
     """
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.follower.microphones, scenario.sound_speed_m_s
@@ -57,7 +50,7 @@ def localization_summary(
             seed=scenario.seed,
         ),
         "versions": versions(),
-        "out": str(out) if out is not None else None,
+        "out": None,
     }
 
 
@@ -67,14 +60,7 @@ def write_localization(
     summary: dict[str, Any],
     directory: Path,
 ) -> None:
-    """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``.
-
-    Args:
-        experiment: The localization experiment.
-        cells: Results, one per position of the source and estimator.
-        summary: The document from ``localization_summary``.
-        directory: Existing directory for the files.
-    """
+    """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``."""
     from analysis.hearing.localization_plots import plot_localization
 
     write_scenario(experiment.scenario, directory)
@@ -90,10 +76,8 @@ def localization_text(summary: dict[str, Any]) -> str:
     lines = [
         f"{cells[0]['trials']} frames per cell, {summary['sound']}, "
         f"{summary['snr_db_at_1m']:g} dB over the noise at 1 m, "
-        + (_tolerances_text(tolerances) if drawn else "no errors of the array")
-    ]
-    lines += [
-        "Han 2019: on hardware; paper: its estimator here; (n): frames without result"
+        + (_tolerances_text(tolerances) if drawn else "no errors of the array"),
+        "Han 2019: on hardware; paper: its estimator here; (n): frames without result",
     ]
     for name, unit in (("range", "m"), ("bearing", "deg")):
         lines += ["", *_table(cells, name, unit)]

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.hearing.cramer_rao import polar_gradients, polar_point
-from analysis.hearing.free_field import Estimator, Loudspeaker
 from analysis.hearing.paper_tables import PaperCell
+from analysis.hearing.single_frames import Estimator, Loudspeaker
 from systems.framework.signals import TICK_S
 from systems.sound.array_shape import ArrayShape
 
@@ -42,12 +42,10 @@ class ArrayErrors:
 
 @dataclass(frozen=True)
 class PolarStd:
-    """Standard deviations of a source's bearing and range."""
+    """Standard deviations of a source's bearing, rad, and range, m."""
 
     bearing: float
-    """Standard deviation of the bearing, rad."""
     range: float
-    """Standard deviation of the range, m."""
 
 
 #: Errors in the sensitivity table: 1 mm, 1 us, 1 % and 1 dB.
@@ -64,15 +62,9 @@ def predicted_std(
 ) -> PolarStd:
     """Predicts the standard deviations due to errors, to first order.
 
-    Args:
-        errors: Errors of the array and of the speed of sound. Gain errors have no
-            effect, because they do not change delays.
-        p_AS: (2,) position of the source from the microphones' centroid, m.
-        shape: The microphones as stated, in the plane.
-        c: Stated speed of sound, m/s.
-
-    Returns:
-        Standard deviations of bearing, rad, and of range, m.
+    Gain errors have no effect, because they do not change delays. The (2,) position
+    p_AS of the source begins at the centroid of the microphones, which lie in the
+    plane.
     """
     rays = p_AS - shape.p_AM
     ranges = np.linalg.norm(rays, axis=1)
@@ -106,27 +98,12 @@ def measured_std(
 ) -> PolarStd:
     """Measures the standard deviations due to Gaussian errors in noise-free frames.
 
-    Large errors give the distribution of the range a long tail. The result is therefore
-    half the width of the central 68 % of the estimates. For a Gaussian distribution,
-    this half width equals the standard deviation. A frame without a valid range counts
-    as infinitely far.
-
-    Args:
-        errors: Errors of the array and of the speed of sound.
-        p_AS: (2,) position of the source from the microphones' centroid, m.
-        shape: The microphones as stated, in the plane.
-        c: Stated speed of sound, m/s.
-        loudspeaker: The sound of the source.
-        estimate: Function from a frame to a position estimate.
-        trials: Number of frames.
-        seed: Seed of the errors.
-
-    Returns:
-        Standard deviations of bearing, rad, and of range, m. If too many frames have no
-        valid range, the standard deviation of the range is infinite.
-
-    Raises:
-        ValueError: A frame has no detectable sound.
+    The other arguments are those of ``predicted_std``. Large errors give the
+    distribution of the range a long tail. The result is therefore half the width of the
+    central 68 % of the estimates. For a Gaussian distribution, this half width equals
+    the standard deviation. A frame without a valid range counts as infinitely far. The
+    standard deviation of the range may thus be infinite. Raises ``ValueError`` if a
+    frame has no detectable sound.
     """
     rng = np.random.default_rng(seed)
     bearings, ranges = np.empty(trials), np.empty(trials)
@@ -161,19 +138,9 @@ def sensitivity_table(
 ) -> list[dict[str, Any]]:
     """Computes the effect of each unit error for each position of the source.
 
-    The unit errors are 1 mm, 1 us, 1 % of the speed of sound, and 1 dB.
-
-    Args:
-        places: Positions of the source.
-        shape: The microphones, in the plane.
-        c: Speed of sound, m/s.
-        estimate: Function from a frame to a position estimate.
-        trials: Number of frames per row.
-        seed: Seed of all random numbers.
-
-    Returns:
-        Rows of the JSON document, with ranges in m and bearings in deg. An infinite
-        range becomes None.
+    The unit errors are 1 mm, 1 us, 1 % of the speed of sound, and 1 dB. Each row of the
+    JSON document has its own ``trials`` frames. In the document, an infinite standard
+    deviation of the range is None.
     """
     loudspeaker = Loudspeaker.of("chirp", seed)
     rows = []

@@ -9,13 +9,6 @@ _MOST_TRIALS = 100_000
 
 
 def check_trials(trials: int) -> None:
-    """Checks the number of measurements per position of the source.
-
-    Args:
-        trials: Number of measurements.
-
-    Raises:
-        InputError: The number is too large, or too small for a standard deviation.
-    """
+    """Raises ``InputError`` if there are too many trials, or fewer than two."""
     if not 2 <= trials <= _MOST_TRIALS:
         raise InputError("trials", f"{trials} must lie between 2 and {_MOST_TRIALS}")

@@ -1,4 +1,4 @@
-"""Figures of operating points, loops, and pole clouds of uncertain parameters."""
+"""Figures of operating points, loops, delays, contact, and uncertain parameters."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from matplotlib.patches import Circle, Polygon
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from analysis.linear.contact_mode import ContactLimits
+from analysis.linear.delayed_run import DelayCheck
 from analysis.linear.gang_of_four import GangOfFour
 from analysis.linear.loop_margins import FrequencyResponse, LoopMargins
 from analysis.linear.robustness import PoleCloud, PoleSensitivity
@@ -375,4 +377,62 @@ def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
         axes.set_title(title, fontsize=10)
         draw_grid(axes, "x")
         axes.xaxis.set_major_locator(MaxNLocator(4))
+    return figure
+
+
+def plot_contact_limits(limits: ContactLimits) -> Figure:
+    """Plots the largest stable K_0 and k_ref over the motor lag, for each latency."""
+    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
+    sides = (
+        ("K_0 (N/m)", limits.stiffness_n_m, limits.stiffness_today_n_m),
+        (
+            "k_ref (N/m)",
+            limits.reference_stiffness_n_m,
+            limits.reference_stiffness_today_n_m,
+        ),
+    )
+    for axes, (name, values, today) in zip(figure.subplots(1, 2), sides, strict=True):
+        for k, ticks in enumerate(limits.latency_ticks):
+            axes.loglog(
+                limits.motor_lags_s,
+                np.maximum(values[:, k], 1e-2),
+                "o-",
+                markersize=3,
+                color=_CYCLE[k % len(_CYCLE)],
+                label=f"{ticks * limits.tick_s * 1e3:.0f} ms",
+            )
+        axes.plot(
+            limits.today[0],
+            today,
+            "*",
+            markersize=14,
+            color="#F0E442",
+            markeredgecolor="black",
+        )
+        axes.annotate(
+            "current",
+            (limits.today[0], today),
+            textcoords="offset points",
+            xytext=(8, 4),
+        )
+        axes.set_xlabel("motor lag (s)")
+        axes.set_ylabel(f"largest stable {name}")
+        axes.grid(visible=True, which="both", linewidth=0.3)
+        axes.legend(title="latency of echoes", fontsize=8, title_fontsize=8)
+    return figure
+
+
+def plot_delay_check(check: DelayCheck) -> Figure:
+    """Plots the simulated offsets for 0.95 and 1.05 times the delay margin."""
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    runs = (("0.95", check.below), ("1.05", check.above))
+    for axes, (share, run) in zip(figure.subplots(1, 2), runs, strict=True):
+        axes.plot(run.time_s, 1e6 * run.offset_m, color=_CYCLE[0], linewidth=0.7)
+        axes.set_title(
+            f"{share} of {check.margin.delay_s * 1e3:.1f} ms at the "
+            f"{check.margin.at}: growth {run.growth_per_s:+.4f} 1/s",
+            fontsize=9,
+        )
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel("offset of P (um)")
     return figure

@@ -44,9 +44,8 @@ class LiveFaults:
 
     The examination of three seconds takes a quarter of a second, or more with many
     channels. It therefore runs in a separate thread. Its faults are reported two
-    seconds of sound after its start. If the examination takes longer, they are reported
-    when it has finished. At the end of the stream, the remaining faults are reported at
-    once.
+    seconds of sound after its start, or later if the examination takes longer. At the
+    end of the stream, the remaining faults are reported at once.
     """
 
     geometry: ArrayGeometry
@@ -61,11 +60,9 @@ class LiveFaults:
         self.begin(range(len(self.geometry.microphones)))
 
     def begin(self, alive: Sequence[int] | None = None) -> None:
-        """Restarts the examination, for example after a gap in the stream.
+        """Restarts the examination, for example after a gap.
 
-        Args:
-            alive: Numbers of the channels to use from now on. None: the same channels
-                as before.
+        Without ``alive``, the same channels are used as before.
         """
         if alive is not None:
             self._alive = list(alive)
@@ -80,14 +77,9 @@ class LiveFaults:
         self._worker.shutdown(cancel_futures=True)
 
     def look(self, channels: NDArray[np.float32]) -> Iterator[ChannelFault]:
-        """Examines another block of samples.
+        """Examines the next (n, k) samples of the array's channels.
 
-        Args:
-            channels: (n, k) samples of the array's channels.
-
-        Yields:
-            Faults, with channel numbers from 0. A lasting fault is reported again and
-            again.
+        Channel numbers of faults begin with 0. A lasting fault is reported repeatedly.
         """
         self._held.append(channels)
         while sum(part.shape[1] for part in self._held) >= self._size:
@@ -96,11 +88,7 @@ class LiveFaults:
             yield from self._of_stretch(joined[:, : self._size])
 
     def finish(self) -> Iterator[ChannelFault]:
-        """Reports the remaining faults at the end of the stream.
-
-        Yields:
-            Faults that were not reported before.
-        """
+        """Reports the remaining faults at the end of the stream."""
         if not self._looks and self._stretches and self._hears():
             self._pending = self._begin_look()
         if self._pending is not None:
@@ -141,10 +129,9 @@ class LiveFaults:
         )
 
     def _is_done(self, pending: Future[list[ChannelFault]]) -> bool:
-        """Returns whether an examination has finished, after a wait of limited length.
+        """Returns whether an examination is done, at the latest 2 s after its start.
 
-        The wait ends 2 s after the start of the examination. Live sound would arrive no
-        faster.
+        Live sound would arrive no faster.
         """
         spare = self._begun + _TOLD * STRETCH_S - time.monotonic()
         return bool(wait([pending], max(0.0, spare)).done)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.voting.direction_votes import VotePlan
-from analysis.arrays.voting.listening_plan import vote_plan
 from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
@@ -21,18 +20,20 @@ from analysis.arrays.voting.source_listener import (
 )
 from analysis.listening.live_faults import LiveFaults
 from analysis.listening.sound_stream import SoundBlock, SoundStream, StreamBrokenError
-from analysis.recordings.array_geometry import ArrayGeometry
-from analysis.recordings.array_match import array_mismatch, chosen_microphones
+from analysis.recordings.array_geometry import (
+    LOWEST_LIVE_HZ,
+    ArrayGeometry,
+    usable_band,
+)
 from analysis.recordings.channel_faults import ChannelFault
+from analysis.recordings.prepared_recording import array_mismatch, chosen_microphones
 from systems.framework.input_error import InputError
-
-_BAND_HZ = (200.0, 15_000.0)
-_TOP_OF_RATE = 0.45
 
 # Kinds of faults that make bearings wrong. Only the user can correct them.
 _FATAL = ("copied", "swapped", "units", "drift")
 
-_QUIET_DB = -120.0
+# Least power that a level expresses, relative to full scale: -120 dB.
+_QUIET = 1e-12
 
 # Largest magnitude of a valid sample; full scale is 1.
 _WILD = 1e3
@@ -74,15 +75,9 @@ class HeardStep:
 class LiveHearing:
     """Tracks the sources in a stream with the array that hears it.
 
-    Args:
-        stream: Stream of sound.
-        geometry: Geometry of the array.
-        name_fault: Function that is called once for each fault, as soon as the fault is
-            detected. Its arguments are the message and the time in s.
-
-    Raises:
-        InputError: The stream does not match the array, or the array cannot measure
-            bearings.
+    Calls ``name_fault`` once for each fault, as soon as the fault is detected, with the
+    message and the time in s. Raises ``InputError`` if the stream does not match the
+    array, or if the array cannot measure bearings.
     """
 
     def __init__(
@@ -110,18 +105,14 @@ class LiveHearing:
 
     def _voting(self, geometry: ArrayGeometry) -> VotePlan:
         rate, known = float(self._stream.sample_rate_hz), geometry.known
-        band = geometry.band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
-        return vote_plan(known.shape, known.c, rate, band)
+        band_hz = usable_band(geometry.band, rate, lowest_hz=LOWEST_LIVE_HZ)
+        return VotePlan.of(known.shape, known.c, rate, band_hz=band_hz)
 
     def steps(self) -> Iterator[HeardStep]:
-        """Tracks the sources to the end of the stream.
+        """Yields the sources of each step as soon as the sound of the step has arrived.
 
-        Yields:
-            The sources of each step, as soon as the sound of the step has arrived.
-
-        Raises:
-            StreamBrokenError: The stream broke off, or too few channels are left to
-                measure bearings.
+        Raises ``StreamBrokenError`` if the stream breaks off, or if too few channels
+        are left to measure bearings.
         """
         looks = LiveFaults(self._geometry, self._stream.sample_rate_hz)
         powers: list[float] = []
@@ -137,7 +128,8 @@ class LiveHearing:
                 )
                 for step in steps:
                     self.heard.identities |= {track.identity for track in step.tracks}
-                    yield HeardStep(step, _decibels(float(np.mean(powers))))
+                    power = max(_QUIET, float(np.mean(powers)))
+                    yield HeardStep(step, 10.0 * math.log10(power))
                     powers.clear()
             for fault in looks.finish():
                 self._mend(fault, looks)
@@ -209,22 +201,11 @@ class LiveHearing:
             self._name_fault(fault, self.heard.seconds)
 
 
-def _decibels(power: float) -> float:
-    return max(_QUIET_DB, 10.0 * math.log10(max(power, 1e-30)))
+def listen_to(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStream:
+    """Listens to the end of a stream, and calls ``tell`` for each step.
 
-
-def listen(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStream:
-    """Listens to the end of a stream.
-
-    Args:
-        hearing: Stream and array.
-        tell: Function that is called with the sources of each step.
-
-    Returns:
-        Summary of the stream. Its status says how the stream ended.
-
-    Raises:
-        InputError: The first samples show that the stream cannot be used.
+    The status in the result says how the stream ended. Raises ``InputError`` if the
+    first samples show that the stream cannot be used.
     """
     try:
         for step in hearing.steps():
@@ -236,14 +217,7 @@ def listen(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStre
 
 
 def track_document(step: HeardStep) -> list[dict[str, Any]]:
-    """Makes a JSON object for each source of a step.
-
-    Args:
-        step: Sources of a step.
-
-    Returns:
-        One dictionary per source, with the time in s and angles in deg.
-    """
+    """Makes a JSON object for each source of a step. Angles are in deg."""
     return [
         {
             "t_s": round(step.sources.t_s, 6),

@@ -33,20 +33,11 @@ _LOST = "samples were lost; close other programs, or lower the rate"
 def open_card(
     device: str | int | None, *, channels: int, sample_rate_hz: int
 ) -> SoundStream:
-    """Opens a stream from a sound card.
+    """Opens an endless stream from a sound card.
 
-    Args:
-        device: Name of the card, a part of its name, or its number. None: the default
-            card.
-        channels: Number of channels to record.
-        sample_rate_hz: Sample rate, Hz.
-
-    Returns:
-        The stream, which has no end.
-
-    Raises:
-        InputError: The package or the card is missing, or the card cannot record these
-            channels at this rate.
+    The card is given by its name, a part of its name, or its number. None selects the
+    default card. Raises ``InputError`` if the package or the card is missing, or if the
+    card cannot record these channels at this rate.
     """
     try:
         import sounddevice

@@ -33,13 +33,14 @@ from systems.framework.input_error import InputError
 
 SampleFormat = Literal["s16le", "s24le", "s32le", "f32le"]
 
-#: Formats of raw samples, by the names that other programs use, and their bytes per
-#: sample.
-SAMPLE_FORMATS: dict[SampleFormat, int] = {
-    "s16le": 2,
-    "s24le": 3,
-    "s32le": 4,
-    "f32le": 4,
+# Formats of raw samples, by the names that other programs use. Each has a number of
+# bytes per sample, the type of the numbers, and their full scale. A sample of 24 bits
+# is converted to the high bytes of 32 bits.
+_FORMATS: dict[SampleFormat, tuple[int, str, float]] = {
+    "s16le": (2, "<i2", 2.0**15),
+    "s24le": (3, "<i4", 2.0**31),
+    "s32le": (4, "<i4", 2.0**31),
+    "f32le": (4, "<f4", 1.0),
 }
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
@@ -76,7 +77,7 @@ class _Format(NamedTuple):
     @property
     def width(self) -> int:
         """Bytes of one sample of all channels."""
-        return self.channels * SAMPLE_FORMATS[self.samples]
+        return self.channels * _FORMATS[self.samples][0]
 
     def __str__(self) -> str:
         return f"{self.channels} channels, {self.sample_rate_hz} Hz, {self.samples}"
@@ -90,25 +91,13 @@ def open_pipe(
     sample_rate_hz: int | None = None,
     sample_format: SampleFormat = "s16le",
 ) -> SoundStream:
-    """Opens a stream from a pipe or a file.
+    """Opens a stream from a pipe or file, which is read to its end without seeking.
 
-    The pipe is read to its end, without seeking.
-
-    Args:
-        pipe: Pipe or file with a file descriptor, from which nothing was read before.
-            The stream owns it and closes it.
-        raw_channels: Number of channels of raw samples if ``channels`` is None.
-        channels: Stated number of channels. None: the number in the WAV header.
-        sample_rate_hz: Stated sample rate, Hz. None: the rate in the WAV header.
-        sample_format: Format of raw samples.
-
-    Returns:
-        The stream.
-
-    Raises:
-        InputError: There are three possible causes. The input is empty. Its header is
-            not WAV or contradicts the stated values. The input is raw and no sample
-            rate is stated.
+    The stream owns and closes the pipe, which must have a file descriptor. Without
+    ``channels``, the WAV header states the number of channels, and raw samples have
+    ``raw_channels``. Raises ``InputError`` if the input is empty, if its WAV header is
+    invalid or contradicts the stated values, or if the input is raw and no sample rate
+    is stated.
     """
     with ExitStack() as stack:
         stack.callback(pipe.close)
@@ -127,9 +116,8 @@ def open_pipe(
 def _begin(source: _Source, raw: _Format | None) -> tuple[_Format, int | None]:
     """Reads the beginning of the input up to the samples.
 
-    Returns:
-        form: Format of the samples; ``raw`` if there is no header.
-        length: Number of bytes of the samples. None if it is unknown.
+    Returns the format of the samples, which is ``raw`` if there is no header, and their
+    number of bytes, or None if it is unknown.
     """
     start = source.read(4)
     if not start:
@@ -163,12 +151,8 @@ class _Source:
     def some(self, size: int) -> bytes | None:
         """Reads up to ``size`` bytes.
 
-        Args:
-            size: Largest number of bytes.
-
-        Returns:
-            The bytes. Empty at the end of the input. None if nothing has arrived for
-            1 s.
+        Returns no bytes at the end of the input, and None if nothing has arrived for 1
+        s.
         """
         if self._unread:
             data, self._unread = self._unread[:size], self._unread[size:]
@@ -194,16 +178,8 @@ def open_flac(
 ) -> SoundStream:
     """Opens a stream from a FLAC file.
 
-    Args:
-        path: FLAC file.
-        channels: Stated number of channels. None: the number in the file.
-        sample_rate_hz: Stated sample rate, Hz. None: the rate in the file.
-
-    Returns:
-        The stream.
-
-    Raises:
-        InputError: The file cannot be decoded, or it contradicts the stated values.
+    Raises ``InputError`` if the file cannot be decoded or contradicts the stated
+    values.
     """
     try:
         sound = soundfile.SoundFile(path)
@@ -242,9 +218,8 @@ def _check_stated(
 def _wav_header(source: _Source) -> tuple[_Format, int | None]:
     """Reads a WAV header after the bytes RIFF, up to the samples.
 
-    Returns:
-        form: Format of the samples.
-        length: Number of bytes of the samples. None if the header does not state it.
+    Returns the format and the number of bytes of the samples, or None if the header
+    does not state the number.
     """
     _exactly(source, 4)
     if _exactly(source, 4) != b"WAVE":
@@ -292,13 +267,7 @@ def _exactly(source: _Source, size: int) -> bytes:
 def _blocks(source: _Source, form: _Format, length: int | None) -> Iterator[SoundBlock]:
     """Yields blocks of samples, including those of further WAV files in the stream.
 
-    Args:
-        source: Input after the header.
-        form: Format of the samples.
-        length: Number of bytes of the samples. None if it is unknown.
-
-    Yields:
-        Blocks of samples. A block without samples reports a pause or an incomplete end.
+    A block without samples reports a pause or an incomplete end.
     """
     pace, gap, cut = Pace(form.sample_rate_hz), False, 0
     for data in _chunks(source, form, length):
@@ -322,10 +291,9 @@ def _blocks(source: _Source, form: _Format, length: int | None) -> Iterator[Soun
 def _chunks(
     source: _Source, form: _Format, length: int | None
 ) -> Iterator[bytes | None]:
-    """Yields the bytes of whole samples. Only the last bytes may be incomplete.
+    """Yields the bytes of whole samples, or None if nothing has arrived for 1 s.
 
-    Yields:
-        Bytes, or None if nothing has arrived for 1 s.
+    Only the last bytes may be incomplete.
     """
     most = form.width * max(1, round(BLOCK_S * form.sample_rate_hz))
     while True:
@@ -360,11 +328,7 @@ def _chunks(
 
 
 def _reaches_another(source: _Source) -> bool:
-    """Skips the chunks after the samples of a WAV until another WAV begins.
-
-    Returns:
-        True if another WAV begins, False at the end of the input.
-    """
+    """Skips the chunks after a WAV's samples. Returns whether another WAV begins."""
     while (name := source.read(4)) != b"RIFF":
         size = source.read(4)
         if len(name + size) < 8:
@@ -375,11 +339,7 @@ def _reaches_another(source: _Source) -> bool:
 
 
 def _another(source: _Source, form: _Format) -> int | None:
-    """Reads the header of a further WAV after the bytes RIFF.
-
-    Returns:
-        Number of bytes of its samples. None if it is unknown.
-    """
+    """Reads the header of a further WAV. Returns the number of bytes of its samples."""
     other, length = _wav_header(source)
     if other != form:
         # Times and delays are counted in samples, so the rate must not change.
@@ -392,16 +352,10 @@ def _another(source: _Source, form: _Format) -> int | None:
 
 def _samples(data: bytes, form: _Format) -> NDArray[np.float32]:
     """Converts bytes to (channels, k) samples; full scale is 1."""
-    return _numbers(data, form.samples).reshape(-1, form.channels).T
-
-
-def _numbers(data: bytes, sample_format: SampleFormat) -> NDArray[np.float32]:
-    if sample_format == "f32le":
-        return np.frombuffer(data, dtype="<f4").astype(np.float32)
-    if sample_format == "s16le":
-        return np.frombuffer(data, dtype="<i2").astype(np.float32) / np.float32(2**15)
-    if sample_format == "s32le":
-        return np.frombuffer(data, dtype="<i4").astype(np.float32) / np.float32(2**31)
-    wide = np.zeros((len(data) // 3, 4), dtype=np.uint8)
-    wide[:, 1:] = np.frombuffer(data, dtype=np.uint8).reshape(-1, 3)
-    return wide.view("<i4")[:, 0].astype(np.float32) / np.float32(2**31)
+    width, kind, full_scale = _FORMATS[form.samples]
+    if width == 3:
+        wide = np.zeros((len(data) // 3, 4), dtype=np.uint8)
+        wide[:, 1:] = np.frombuffer(data, dtype=np.uint8).reshape(-1, 3)
+        data = wide.tobytes()
+    numbers = np.frombuffer(data, kind).astype(np.float32) / np.float32(full_scale)
+    return numbers.reshape(-1, form.channels).T

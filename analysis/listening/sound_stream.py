@@ -61,11 +61,7 @@ class Pace:
     """Checks whether samples arrive at the stated rate.
 
     The check is made only if this program waits for the samples. A file arrives as fast
-    as it is read.
-
-    Args:
-        sample_rate_hz: Stated sample rate, Hz.
-        clock: Function that returns the time of this computer, s.
+    as it is read. ``clock`` returns the time in s.
     """
 
     def __init__(
@@ -83,14 +79,9 @@ class Pace:
         self._waited = 0.0
 
     def came(self, samples: int, waited_s: float) -> tuple[str, ...]:
-        """Counts a block of samples.
+        """Counts samples per channel and the time spent waiting for them.
 
-        Args:
-            samples: Number of samples per channel that have arrived.
-            waited_s: Time spent waiting for them, s.
-
-        Returns:
-            One message if the rate is wrong, otherwise nothing.
+        Returns one message if the rate is wrong, otherwise nothing.
         """
         self._samples += samples
         self._waited += waited_s

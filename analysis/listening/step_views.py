@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from types import TracebackType
-from typing import Protocol, TextIO
+from contextlib import AbstractContextManager
+from typing import TextIO
 
 from analysis.arrays.voting.source_listener import TrackedSources
 from analysis.arrays.voting.source_tracks import SourceTrack
@@ -24,39 +24,8 @@ _LEVELS_DB, _BARS = (-72.0, 0.0), 12
 _HIDE, _SHOW, _TO_END, _BELOW = "\x1b[?25l", "\x1b[?25h", "\x1b[K", "\x1b[J"
 
 
-class Teller(Protocol):
-    """Displays steps and faults while they arrive."""
-
-    def tell(self, step: HeardStep) -> None:
-        """Displays the sources of a step."""
-
-    def name_fault(self, fault: str, t_s: float) -> None:
-        """Displays a fault.
-
-        Args:
-            fault: Message about the fault.
-            t_s: Time of the fault, s of sound.
-        """
-
-    def __enter__(self) -> object:
-        """Begins the display."""
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Ends the display, also after an error."""
-
-
-class TextLines:
-    """Writes one line of text per second.
-
-    Args:
-        out: Where to write the sources.
-        errors: Where to write the faults.
-    """
+class TextLines(AbstractContextManager["TextLines"]):
+    """Writes sources to ``out``, one line per second, and faults to ``errors``."""
 
     def __init__(self, out: TextIO, errors: TextIO) -> None:
         self._out, self._errors = out, errors
@@ -70,24 +39,11 @@ class TextLines:
             self._out.flush()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """Writes a fault to ``errors``.
-
-        Args:
-            fault: Message about the fault.
-            t_s: Time of the fault, s of sound.
-        """
+        """Writes a fault at a time in s of sound."""
         self._errors.write(f"phonotaxis: at {t_s:.1f} s: {fault}\n")
         self._errors.flush()
 
-    def __enter__(self) -> TextLines:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Does nothing, because there is nothing to end."""
 
 
@@ -101,24 +57,14 @@ class JsonLines(TextLines):
         self._out.flush()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """Writes a fault to both streams.
-
-        Args:
-            fault: Message about the fault.
-            t_s: Time of the fault, s of sound.
-        """
+        """Writes a fault to both streams."""
         super().name_fault(fault, t_s)
         self._out.write(f"{json.dumps({'t_s': round(t_s, 6), 'fault': fault})}\n")
         self._out.flush()
 
 
 class Screen(TextLines):
-    """Draws the latest step on a terminal, over the previous step.
-
-    Args:
-        out: Terminal.
-        errors: Not used, because faults stay on the screen.
-    """
+    """Draws the latest step on the terminal ``out``, over the previous step."""
 
     def __init__(self, out: TextIO, errors: TextIO) -> None:
         super().__init__(out, errors)
@@ -132,12 +78,7 @@ class Screen(TextLines):
         self._draw()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """Adds a fault, which stays on the screen.
-
-        Args:
-            fault: Message about the fault.
-            t_s: Time of the fault, s of sound.
-        """
+        """Adds a fault, which stays on the screen."""
         self._faults.append(f"! {t_s:.1f} s: {fault}")
         self._draw()
 
@@ -154,31 +95,18 @@ class Screen(TextLines):
         self._out.write(_HIDE)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leaves the last step on the screen, and shows the cursor below it."""
         self._out.write(_SHOW)
         self._out.flush()
 
 
 def view(step: HeardStep, width: int, faults: list[str]) -> list[str]:
-    """Formats a step as lines of text.
+    """Formats a step as lines of text for a screen with ``width`` columns.
 
     The lines are a compass, one line per source, and one line per fault. The middle of
     the compass is ahead (+x). Its left half goes to the left and its right half to the
     right. Both ends are behind.
-
-    Args:
-        step: Sources and level of a step.
-        width: Number of columns of the screen.
-        faults: Messages about faults, one line each.
-
-    Returns:
-        The lines.
     """
     columns = min(_COLUMNS, max(_LEAST_COLUMNS, width - 3) // 2 * 2 + 1)
     marks, names = ["·"] * columns, [" "] * columns

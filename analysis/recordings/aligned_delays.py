@@ -179,12 +179,8 @@ def _sums(  # pragma: no cover  (compiled)
     """Computes the agreement of the channels and its derivatives.
 
     The agreement is the sum over all pairs and frequencies of Re(cross e^(j w delay)).
-
-    Returns:
-        slope: (b, n - 1) derivative of the agreement of each of b bands with respect to
-            the delays.
-        curve: (n - 1, n - 1) negative second derivative of the total agreement.
-        agreement: Total agreement over all pairs and frequencies.
+    The results are the (b, n - 1) slopes of the agreement in b bands with respect to
+    the delays, its (n - 1, n - 1) negative second derivative, and the agreement itself.
     """
     bands, count = edges.size - 1, tau.size + 1
     slope = np.zeros((bands, count - 1))

@@ -26,7 +26,15 @@ _LARGEST_M = 30.0
 # Largest number of microphones. The computing time grows with the number of pairs.
 _MOST_MICROPHONES = 64
 
-_LEAST_BAND_HZ = 500.0
+LEAST_BAND_HZ = 500.0
+
+#: Default lowest frequency of a recording and of a live stream, Hz.
+LOWEST_HZ, LOWEST_LIVE_HZ = 300.0, 200.0
+#: Default highest frequency, Hz. Lower frequencies suffice to find faults.
+HIGHEST_HZ, HIGHEST_FAULTS_HZ = 15_000.0, 8_000.0
+# Upper limit of a default band, as a share of the sample rate. Near half the sample
+# rate, the filters of recorders attenuate the sound.
+_TOP_OF_RATE = 0.45
 
 # _PLACES_SHARE: default standard deviation of positions as a share of the aperture. It
 #   corresponds to a tape measure for a large array, and to a circuit board for a small
@@ -41,6 +49,13 @@ _TEMPERATURE_C, _SPEED_SHARE = 2.0, 0.01
 # Tolerance for the symmetry and the eigenvalues of a covariance, as a share of its
 # largest variance.
 _ROUNDING = 1e-6
+
+# Pairs of fields of which a geometry states at most one.
+_ALTERNATIVES = (
+    ("sound_speed", "temperature_c"),
+    ("position_std_m", "position_covariance_m2"),
+    ("sound_speed_std", "temperature_std_c"),
+)
 
 _Point3 = Annotated[tuple[float, float, float], Strict(False)]
 _Points = Annotated[tuple[Point, ...], Strict(False)]
@@ -135,10 +150,11 @@ class ArrayGeometry(Parameters):
                 )
             if len(set(self.channels)) != count:
                 raise InputError("channels", "one is named twice; name each once")
-        if self.sound_speed is not None and self.temperature_c is not None:
-            raise InputError(
-                "sound_speed", "is given together with temperature_c; keep one of them"
-            )
+        for one, other in _ALTERNATIVES:
+            if getattr(self, one) is not None and getattr(self, other) is not None:
+                raise InputError(
+                    one, f"is given together with {other}; keep one of them"
+                )
         self._check_band()
         shape = ArrayShape.of(self.microphones)
         if shape.aperture_m > _LARGEST_M:
@@ -155,20 +171,15 @@ class ArrayGeometry(Parameters):
     def _check_band(self) -> None:
         if self.band is not None and self.band[0] >= self.band[1]:
             raise InputError("band", "must rise, for example [300, 8000]")
-        if self.band is not None and self.band[1] - self.band[0] < _LEAST_BAND_HZ:
+        if self.band is not None and self.band[1] - self.band[0] < LEAST_BAND_HZ:
             raise InputError(
                 "band",
                 f"{list(self.band)} is too narrow to measure delays; give at least "
-                f"{_LEAST_BAND_HZ:g} Hz",
+                f"{LEAST_BAND_HZ:g} Hz",
             )
 
     def _check_budget(self, shape: ArrayShape) -> None:
         std, covariance = self.position_std_m, self.position_covariance_m2
-        if std is not None and covariance is not None:
-            raise InputError(
-                "position_std_m",
-                "is given together with position_covariance_m2; keep one of them",
-            )
         if isinstance(std, tuple) and len(std) != shape.count:
             raise InputError(
                 "position_std_m",
@@ -177,11 +188,6 @@ class ArrayGeometry(Parameters):
             )
         if covariance is not None:
             _check_covariance(covariance, shape)
-        if self.sound_speed_std is not None and self.temperature_std_c is not None:
-            raise InputError(
-                "sound_speed_std",
-                "is given together with temperature_std_c; keep one of them",
-            )
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -258,21 +264,22 @@ def _check_covariance(given: tuple[tuple[float, ...], ...], shape: ArrayShape) -
         )
 
 
+def usable_band(
+    band_hz: tuple[float, float] | None,
+    sample_rate_hz: float,
+    lowest_hz: float = LOWEST_HZ,
+    highest_hz: float = HIGHEST_HZ,
+) -> tuple[float, float]:
+    """Returns the stated band, or the default band at a sample rate."""
+    return band_hz or (lowest_hz, min(highest_hz, _TOP_OF_RATE * sample_rate_hz))
+
+
 def make_geometry(
     geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None,
 ) -> ArrayGeometry:
-    """Makes a geometry from any supported description of the microphones.
+    """Makes a geometry from a geometry, a path, a list of positions in m, or None.
 
-    Args:
-        geometry: A geometry, the path of a geometry file, or a list of positions (x, y)
-            or (x, y, z) in m. None: the robot's own array.
-
-    Returns:
-        The geometry of the array.
-
-    Raises:
-        InputError: The description is invalid. The message states the cause and the
-            remedy.
+    None stands for the robot's own array.
     """
     if geometry is None:
         return ROBOT_ARRAY
@@ -293,19 +300,7 @@ def make_geometry(
 
 
 def load_geometry(path: str | Path) -> ArrayGeometry:
-    """Reads a geometry file.
-
-    Args:
-        path: YAML file with ``microphones`` and optionally the other fields of
-            ``ArrayGeometry``.
-
-    Returns:
-        The geometry in the file.
-
-    Raises:
-        InputError: The file is missing, is not YAML, or has an invalid value. The
-            message names the field and the remedy.
-    """
+    """Reads a YAML file with ``microphones`` and optionally the other fields."""
     path = require_file(path, "geometry", "YAML")
     try:
         content = parse_yaml(path.read_text(encoding="utf-8"), "geometry")

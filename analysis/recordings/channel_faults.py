@@ -7,10 +7,8 @@ There are these checks:
   (``systems.delays.copied_channels``).
 - Each channel compared with the others: its level, and the height and the sign of its
   correlation with them.
-- The delays of all channels: whether they match the size of the array
-  (``analysis.recordings.delay_scale``).
-- The delays of all channels: whether they fit a position of a source
-  (``analysis.recordings.channel_order``).
+- The delays of all channels: whether they match the size of the array, and whether
+  they fit a position of a source (``analysis.recordings.frame_delays``).
 """
 
 from __future__ import annotations
@@ -22,9 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.pair_correlations import PairCorrelations, correlate_pairs
-from analysis.recordings.array_geometry import KnownArray
-from analysis.recordings.channel_order import FrameDelays, exchanged_channels, misfit
-from analysis.recordings.delay_scale import REACHES_M, DelayScale, delay_scale
+from analysis.recordings.array_geometry import (
+    HIGHEST_FAULTS_HZ,
+    KnownArray,
+    usable_band,
+)
+from analysis.recordings.frame_delays import (
+    REACHES_M,
+    DelayScale,
+    FrameDelays,
+    delay_scale,
+    exchanged_channels,
+    misfit,
+)
 from systems.delays.copied_channels import copied_pairs
 from systems.sound.array_shape import ArrayShape
 
@@ -66,14 +74,17 @@ _FARTHEST_M = 20.0
 _LEAD = 0.1
 
 
+_Kind = Literal[
+    "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
+    "units", "size", "late", "drift"
+]  # fmt: skip
+
+
 @dataclass(frozen=True)
 class ChannelFault:
     """A fault of one or more channels, or of the description of the array."""
 
-    kind: Literal[
-        "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
-        "units", "size", "late", "drift"
-    ]  # fmt: skip
+    kind: _Kind
     channels: tuple[int, ...]
     """Numbers of the faulty channels, from 0. Empty if the fault concerns all channels.
     """
@@ -88,18 +99,11 @@ def find_channel_faults(
     sample_rate_hz: float,
     band_hz: tuple[float, float] | None = None,
 ) -> list[ChannelFault]:
-    """Finds the faults of the channels of a recording.
+    """Finds the faults of the (n, samples) channels of a recording.
 
-    Args:
-        samples: (n, samples) recorded samples, one row per microphone.
-        array: The n microphones and the errors of their description.
-        sample_rate_hz: Sample rate, Hz.
-        band_hz: Lowest and highest frequency of the sound, Hz. None: 300 Hz up to
-            8000 Hz or 0.45 times the sample rate, whichever is lower.
-
-    Returns:
-        The faults that were found. An empty list does not prove that all channels are
-        good, because a silent recording shows few faults.
+    An empty list does not prove that all channels are good, because a silent recording
+    shows few faults. If ``band_hz`` is None, the band is 300 Hz up to 8000 Hz or 0.45
+    times the sample rate, whichever is lower.
     """
     shape, c = array.shape, array.c
     faults = [_unreadable(k, channel) for k, channel in enumerate(samples)]
@@ -110,7 +114,7 @@ def find_channel_faults(
         return found
     readable = samples if use.size == len(samples) else samples[use]
     found += _copied(readable, use, sample_rate_hz)
-    band_hz = band_hz or (300.0, min(8000.0, 0.45 * sample_rate_hz))
+    band_hz = usable_band(band_hz, sample_rate_hz, highest_hz=HIGHEST_FAULTS_HZ)
     measured = correlate_pairs(readable, shape.max_delay(c), sample_rate_hz, band_hz)
     if measured is None:
         return found
@@ -147,20 +151,20 @@ def find_channel_faults(
     return found + (order if scale is None else [_scale_fault(scale, shape)])
 
 
+def _of_channel(kind: _Kind, k: int, text: str) -> ChannelFault:
+    return ChannelFault(kind, (k,), f"channel {k + 1}: {text}")
+
+
 def _dead(k: int, seen: str) -> ChannelFault:
     remedy = "check its microphone, or leave it out of the geometry"
-    return ChannelFault("dead", (k,), f"channel {k + 1}: dead, {seen}; {remedy}")
+    return _of_channel("dead", k, f"dead, {seen}; {remedy}")
 
 
 def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     wrong = np.flatnonzero(~np.isfinite(channel))
     if wrong.size:
-        return ChannelFault(
-            "nan",
-            (k,),
-            f"channel {k + 1}: sample {wrong[0]} is not a number ({wrong.size} "
-            "samples in all); repair the file",
-        )
+        text = f"sample {wrong[0]} is not a number ({wrong.size} samples in all)"
+        return _of_channel("nan", k, f"{text}; repair the file")
     if channel.size and np.ptp(channel) == 0.0:
         return _dead(k, f"all samples are {channel[0]:g}")
     return None
@@ -169,22 +173,19 @@ def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
 def _copied(
     samples: NDArray[np.float64], use: NDArray[np.int64], sample_rate_hz: float
 ) -> list[ChannelFault]:
-    return [
-        ChannelFault(
-            "copied",
-            (int(use[i]), int(use[j])),
-            f"channels {use[i] + 1} and {use[j] + 1}: their samples are equal apart "
-            "from gain and delay; record every microphone on its own channel",
+    faults = []
+    for pair in copied_pairs(samples, sample_rate_hz):
+        i, j = use[list(pair)].tolist()
+        text = (
+            f"channels {i + 1} and {j + 1}: their samples are equal apart from gain "
+            "and delay; record every microphone on its own channel"
         )
-        for i, j in copied_pairs(samples, sample_rate_hz)
-    ]
+        faults.append(ChannelFault("copied", (i, j), text))
+    return faults
 
 
 def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
-    """Returns a fault if many samples of a channel have its lowest or highest value.
-
-    The value must occur far more often than each of the next three values.
-    """
+    """Reports a channel with far more samples at its extremes than just inside them."""
     _, counts = np.unique(channel, return_counts=True)
     most = 0
     for ends in (counts, counts[::-1]):
@@ -193,12 +194,8 @@ def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     share = most / channel.size
     if share < _CLIPPED_SHARE:
         return None
-    return ChannelFault(
-        "clipped",
-        (k,),
-        f"channel {k + 1}: clipped, {100 * share:.2g} % of its samples are at an "
-        "extreme; record with less gain",
-    )
+    text = f"clipped, {100 * share:.2g} % of its samples are at an extreme"
+    return _of_channel("clipped", k, f"{text}; record with less gain")
 
 
 def _levels(
@@ -218,25 +215,19 @@ def _levels(
         # The source is near one microphone if the levels of all other channels are
         # similar.
         if over > near_db and np.ptp(others) < near_db:
-            faults.append(
-                ChannelFault(
-                    "near",
-                    (channel,),
-                    f"channel {channel + 1}: {over:.0f} dB above the others: the "
-                    "source is close to its microphone, or gains differ; move the "
-                    "source away from the array, or set equal gains",
-                )
+            text = (
+                f"{over:.0f} dB above the others: the source is close to its "
+                "microphone, or gains differ; move the source away from the array, or "
+                "set equal gains"
             )
+            faults.append(_of_channel("near", channel, text))
     return faults
 
 
 def _strangers(
     measured: PairCorrelations, use: NDArray[np.int64]
 ) -> list[ChannelFault]:
-    """Finds channels that have no sound in common with the others.
-
-    The others must share a sound with each other.
-    """
+    """Finds channels that have no sound in common with the others."""
     table = np.zeros((use.size, use.size))
     table[tuple(measured.pairs.T)] = measured.shared
     best = (table + table.T).max(axis=0)
@@ -267,18 +258,13 @@ def _inverted(
     agreement = signs * (table @ (signs * alive)) / max(alive.sum() - 1, 1)
     if np.any(agreement[alive] < _LEAD):
         return []
-    return [
-        ChannelFault(
-            "inverted",
-            (int(use[k]),),
-            f"channel {use[k] + 1}: inverted, because its correlation with the others "
-            "is negative; exchange the wires of its microphone, or the sign of its "
-            "samples",
-        )
-        # The sign of a channel without any sound in common with the others is
-        # arbitrary.
-        for k in np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
-    ]
+    text = (
+        "inverted, because its correlation with the others is negative; exchange the "
+        "wires of its microphone, or the sign of its samples"
+    )
+    # The sign of a channel without any sound in common with the others is arbitrary.
+    negative = np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
+    return [_of_channel("inverted", int(use[k]), text) for k in negative]
 
 
 def _lags(
@@ -291,42 +277,27 @@ def _lags(
 
 
 def _fits(delays: FrameDelays) -> bool:
-    """Returns whether all pairs agree on delays in enough frames.
-
-    Enough means at least half of the frames, and at least 16.
-    """
     agreed, _ = delays.agreeing()
     return len(agreed) >= max(_LEAST_FRAMES, len(delays.lags) / 2)
 
 
 def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
-    """Describes the fault of delays that do not match the size of the array."""
     size = f"an array of {shape.aperture_m:.3g} m"
     if scale.kind == "beyond":
         remedy = "check the positions (in m) and the order of the channels"
         if scale.share > _OTHER_UNITS:
             remedy = "give positions in m (multiply them by 10, 100 or 1000?)"
-        return ChannelFault(
-            "units",
-            (),
-            f"microphones: {size} cannot have delays {scale.share:.1f} times as long "
-            f"as sound takes along it; {remedy}",
-        )
-    said = f"microphones: delays are below {100 * scale.share:.1g} % of what {size}"
+        times = f"{scale.share:.1f} times as long as sound takes along it"
+        text = f"microphones: {size} cannot have delays {times}; {remedy}"
+        return ChannelFault("units", (), text)
+    said = f"delays are below {100 * scale.share:.1g} % of what {size} can have"
     if shape.kind == "space" or scale.least_range_m > _FARTHEST_M:
-        return ChannelFault(
-            "units",
-            (),
-            f"{said} can have; give positions in m (divide those in cm by 100, in mm "
-            "by 1000)",
-        )
+        remedy = "give positions in m (divide those in cm by 100, in mm by 1000)"
+        return ChannelFault("units", (), f"microphones: {said}; {remedy}")
     where = "ahead of" if shape.kind == "row" else "above or below"
-    return ChannelFault(
-        "size",
-        (),
-        f"{said} can have: the source is straight {where} it, or the positions are "
-        "not in m; check the positions",
-    )
+    cause = f"the source is straight {where} it, or the positions are not in m"
+    text = f"microphones: {said}: {cause}; check the positions"
+    return ChannelFault("size", (), text)
 
 
 def _order(delays: FrameDelays) -> list[ChannelFault]:
@@ -334,23 +305,17 @@ def _order(delays: FrameDelays) -> list[ChannelFault]:
     exchanges = exchanged_channels(delays)
     if exchanges:
         names = " or ".join(f"{a + 1} and {b + 1}" for a, b in exchanges)
-        return [
-            ChannelFault(
-                "swapped",
-                tuple(sorted({k for pair in exchanges for k in pair})),
-                f"channels {names}: exchanged, because the delays fit the geometry "
-                "only in the other order; exchange them in 'channels'",
-            )
-        ]
+        text = (
+            f"channels {names}: exchanged, because the delays fit the geometry only in "
+            "the other order; exchange them in 'channels'"
+        )
+        channels = tuple(sorted({k for pair in exchanges for k in pair}))
+        return [ChannelFault("swapped", channels, text)]
     share = misfit(delays)
     if share is None:
         return []
-    return [
-        ChannelFault(
-            "geometry",
-            (),
-            f"channels: {100 * share:.0f} % of the delays fit no place outside the "
-            "array; check the microphones' positions (in m), their order and the "
-            "speed of sound",
-        )
-    ]
+    text = (
+        f"channels: {100 * share:.0f} % of the delays fit no place outside the array; "
+        "check the microphones' positions (in m), their order and the speed of sound"
+    )
+    return [ChannelFault("geometry", (), text)]

@@ -54,15 +54,10 @@ _MOST_DRIFT = 2e-3
 def common_lags(
     samples: NDArray[np.floating], sample_rate_hz: float
 ) -> NDArray[np.float64]:
-    """Measures the delays of all channels relative to channel 0 in a stretch of sound.
+    """Measures the (n - 1,) delays of channels 1 ... n - 1 after channel 0, s.
 
-    Args:
-        samples: (n, k) samples of n channels.
-        sample_rate_hz: Sample rate, Hz.
-
-    Returns:
-        (n - 1,) delays of channels 1 ... n - 1 after channel 0, s. NaN for a channel
-        that has no sound in common with channel 0.
+    The samples are one stretch of sound with the shape (n, k). The delay is NaN for a
+    channel that has no sound in common with channel 0.
     """
     length = samples.shape[1]
     size = int(fft.next_fast_len(2 * length, real=True))
@@ -89,16 +84,10 @@ def clock_drift(
 ) -> ChannelFault | None:
     """Finds channels whose delays grow steadily beyond what the array allows.
 
-    Args:
-        t_s: (k,) times of the middles of k stretches of the recording, s.
-        lags: (k, n - 1) delays of each stretch, as ``common_lags`` returns them, s.
-        p_AM: (m, 2) or (m, 3) positions of all microphones, m.
-        c: Speed of sound, m/s.
-        channels: Numbers of the n channels in ``lags``, from 0. None: all channels.
-
-    Returns:
-        The drifting channels and the rate of their drift. None if there is no clear
-        drift.
+    The delays ``lags`` are the results of ``common_lags`` for k stretches, with the
+    shape (k, n - 1), and ``t_s`` are the middles of the stretches. ``p_AM`` contains
+    the positions of all microphones, m. If the n channels are not all channels,
+    ``channels`` lists their numbers from 0.
     """
     numbers = list(range(len(p_AM)) if channels is None else channels)
     allowed = np.linalg.norm(p_AM[numbers[1:]] - p_AM[numbers[0]], axis=1) / c
@@ -132,18 +121,7 @@ def recording_drift(
     p_AM: NDArray[np.float64],
     c: float,
 ) -> ChannelFault | None:
-    """Finds channels of a whole recording whose clocks drift.
-
-    Args:
-        samples: (n, k) samples of n channels, without NaN.
-        sample_rate_hz: Sample rate, Hz.
-        p_AM: (n, 2) or (n, 3) positions of the microphones, m.
-        c: Speed of sound, m/s.
-
-    Returns:
-        The drifting channels and the rate of their drift. None if there is no clear
-        drift, or if the recording is too short.
-    """
+    """Finds channels of a whole (n, k) recording without NaN whose clocks drift."""
     size = round(STRETCH_S * sample_rate_hz)
     starts = np.arange(0, samples.shape[1] - size + 1, size)
     starts = starts[:: -(-len(starts) // _MOST) or 1]
@@ -158,12 +136,7 @@ def recording_drift(
 def _slope(
     t_s: NDArray[np.float64], lag: NDArray[np.float64], allowed: float
 ) -> tuple[float, bool]:
-    """Fits a line through delays, and returns whether the line shows a clock drift.
-
-    Returns:
-        slope: Slope of the line, s/s.
-        drifts: Whether the delays grow steadily and leave the allowed range.
-    """
+    """Returns the slope of a line through delays, and whether it shows a drift."""
     heard = np.isfinite(lag)
     if np.count_nonzero(heard) < _LEAST:
         return 0.0, False

@@ -2,48 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from analysis.recordings.array_geometry import (
-    ArrayGeometry,
-    KnownArray,
-    make_geometry,
-)
-from analysis.recordings.array_match import (
-    RecordedSamples,
-    array_mismatch,
-    recorded_samples,
-)
-from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
-from analysis.recordings.clock_drift import recording_drift
+from analysis.recordings.array_geometry import ArrayGeometry, KnownArray
+from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.heard_sources import heard_sources
-from analysis.recordings.locate_result import LocateResult, SourceEstimate
-from analysis.recordings.onset_spectra import AFTER_S, OnsetSpectra
-from analysis.recordings.recording_faults import channels_without_faults
+from analysis.recordings.locate_result import LocatedSource, SourceEstimate
+from analysis.recordings.prepared_recording import (
+    LEAST_SIGHTINGS,
+    SNAPSHOTS,
+    RecordedSamples,
+    prepared_recording,
+)
 from analysis.recordings.recording_search import RecordingSearch, Sighting
-from analysis.recordings.recording_spectra import RecordingSpectra
+from analysis.recordings.recording_spectra import (
+    AFTER_S,
+    OnsetSpectra,
+    RecordingSpectra,
+)
 from analysis.recordings.source_placement import has_place, place_source
 from analysis.recordings.wavefront_misfit import late_channel
-from systems.framework.input_error import InputError
-
-# Default band for a geometry without a band, Hz.
-_BAND_HZ = (300.0, 15_000.0)
-
-# Upper limit of the default band, as a share of the sample rate. Near half the sample
-# rate, the filters of recorders attenuate the sound.
-_TOP_OF_RATE = 0.45
-
-
-# _SNAPSHOTS: numbers of snapshots per stretch to try, in this order. A faint or distant
-#   source needs more snapshots.
-# _LEAST_ESTIMATES: number of estimates that ends the trials.
-_SNAPSHOTS = (8, 32, 128)
-_LEAST_ESTIMATES = 3
 
 # Least agreement of the channels in a window, as a share of the agreement in the best
 # window. Below this share, the window contains more echoes than direct sound.
@@ -71,51 +51,21 @@ class HeardRecording(NamedTuple):
     faults: list[ChannelFault]
 
 
-def locate(
-    recording: str | Path | ArrayLike,
-    geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None = None,
-    *,
-    sample_rate_hz: float | None = None,
-) -> LocateResult:
+def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource:
     """Locates the source of a recording in each short stretch of time.
-
-    Args:
-        recording: WAV or FLAC file with one channel per microphone, at 8-192 kHz. Or
-            (n, samples) recorded samples, one row per microphone.
-        geometry: Geometry of the microphones, the path of a geometry file, or a list of
-            positions (x, y) or (x, y, z) in m. None: the robot's own array.
-        sample_rate_hz: Rate of recorded samples, Hz. None for a file, which states its
-            own rate.
-
-    Returns:
-        The estimates over time. Their standard deviations include the errors that the
-        geometry states. A range is reported if its standard deviation is at most the
-        share ``largest_range_error`` of the range.
-
-    Raises:
-        InputError: The recording cannot be used. The message states the cause and the
-            remedy.
-    """
-    geometry = make_geometry(geometry)
-    return located(recorded_samples(recording, geometry, sample_rate_hz), geometry)
-
-
-def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocateResult:
-    """Locates the source of a recording that has already been read.
 
     Args:
         recorded: Recording that matches the array.
         geometry: Geometry of the microphones.
 
     Returns:
-        The estimates over time, as ``locate`` returns them.
+        The estimates over time.
 
     Raises:
         InputError: The recording cannot be used. The message states the cause and the
             remedy.
     """
-    samples, rate, where = recorded
-    heard = hear(samples, rate, geometry, where)
+    heard = hear(recorded, geometry)
     known, spectra, search = geometry.known, heard.recording, heard.search
     shape = known.shape
     array = {
@@ -130,17 +80,17 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocateResult:
         "delay_std_s": known.budget.delay_std,
         "largest_range_error": known.largest_range_error,
         "band_hz": [spectra.low_hz, spectra.high_hz],
-        "sample_rate_hz": rate,
+        "sample_rate_hz": recorded.rate,
         "frame_s": search.stretch_s,
     }
     sources = heard_sources(
         spectra.channels,
         shape,
         known.c,
-        float(rate),
+        spectra.sample_rate_hz,
         (spectra.low_hz, spectra.high_hz),
     )
-    return LocateResult(
+    return LocatedSource(
         array,
         shape,
         heard.estimates,
@@ -151,82 +101,15 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocateResult:
     )
 
 
-def hear(
-    samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry, name: str
-) -> HeardRecording:
-    """Finds the delays and positions of the source in a recording in memory.
-
-    Args:
-        samples: (channels, samples) recorded samples.
-        rate: Sample rate, Hz.
-        geometry: Geometry of the microphones.
-        name: Name of the recording in messages.
-
-    Returns:
-        Delays and source positions of the stretches, and faults of the channels.
-
-    Raises:
-        InputError: The recording cannot be used. The message states the cause and the
-            remedy.
-    """
-    complaint = array_mismatch(geometry, len(samples), rate)
-    if complaint:
-        raise InputError("recording", f"{name} {complaint}")
+def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
+    """Finds the delays and positions of the source in a recording in memory."""
+    recording, faults = prepared_recording(recorded, geometry)
     known = geometry.known
-    whole = geometry.columns == tuple(range(len(samples)))
-    channels = samples if whole else samples[list(geometry.columns)]
-    recording, faults = _recording(channels, rate, known, geometry.band, name)
-    if not recording.starts.size:
-        raise InputError(
-            "recording",
-            f"{name} has {samples.shape[1]} samples, fewer than one frame of "
-            f"{recording.window.size}; record longer",
-        )
     search, sightings, estimates = _estimates(recording, known)
     late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
     return HeardRecording(recording, search, sightings, estimates, faults)
-
-
-def _recording(
-    channels: NDArray[np.float64],
-    rate: int,
-    array: KnownArray,
-    band: tuple[float, float] | None,
-    where: str,
-) -> tuple[RecordingSpectra, list[ChannelFault]]:
-    """Prepares the chosen channels, and corrects the faults that can be corrected.
-
-    Returns:
-        recording: Short spectra of the corrected channels.
-        faults: The faults that remain worth reporting.
-    """
-    low, high = band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
-    shape = array.shape
-
-    def spectra(channels: NDArray[np.float64]) -> RecordingSpectra:
-        equal = np.empty(channels.shape, dtype=np.float32)
-        for row, channel in zip(equal, channels, strict=True):
-            row[:] = (channel - channel.mean()) / channel.std()
-        return RecordingSpectra(equal, float(rate), low, high, shape.max_delay(array.c))
-
-    def agreement(channels: NDArray[np.float64]) -> float:
-        search = RecordingSearch(spectra(channels), shape, array.c, _SNAPSHOTS[0])
-        return search.mean_response()
-
-    drift = recording_drift(channels, float(rate), shape.p_AM, array.c)
-    # The delays of drifting channels fit no position, so no other check of delays
-    # applies.
-    faults = (
-        [drift]
-        if drift
-        else find_channel_faults(
-            channels, array, sample_rate_hz=float(rate), band_hz=band
-        )
-    )
-    channels, faults = channels_without_faults(channels, faults, agreement, where)
-    return spectra(channels), faults
 
 
 _Heard = tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]
@@ -235,8 +118,8 @@ _Heard = tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]
 def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
     """Locates each short sound of a recording, or else each stretch of time.
 
-    If most of the recording consists of short sounds, each sound gives an estimate.
-    Otherwise the stretches are the shortest ones that give enough estimates.
+    If the recording does not mostly consist of short sounds, the stretches are the
+    shortest ones that give enough estimates.
     """
     sounds = [
         OnsetSpectra(
@@ -252,11 +135,11 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
     if sounds[0].are_most:
         return _clearest([_heard(s, array, snapshots=1) for s in sounds])
     best = None
-    for snapshots in _SNAPSHOTS:
+    for snapshots in SNAPSHOTS:
         heard = _heard(recording, array, snapshots)
         if best is None or len(heard[2]) > len(best[2]):
             best = heard
-        if len(heard[2]) >= min(_LEAST_ESTIMATES, len(heard[0].stretches)):
+        if len(heard[2]) >= min(LEAST_SIGHTINGS, len(heard[0].stretches)):
             break
     assert best is not None
     return best

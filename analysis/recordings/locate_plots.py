@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.hearing.cramer_rao import polar_point
-from analysis.recordings.locate_result import LocateResult
+from analysis.recordings.locate_result import LocatedSource, wrapped_deg
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS, draw_grid
 from analysis.reporting.plain_values import write_json
 
@@ -22,29 +22,17 @@ _WIDTH_IN, _PANEL_IN, _PLAN_IN = 9.0, 1.9, 3.6
 
 
 def write_locate(
-    result: LocateResult, document: dict[str, Any], directory: Path
+    result: LocatedSource, document: dict[str, Any], directory: Path
 ) -> None:
-    """Writes ``locate.json`` and ``locate.png`` into a directory.
-
-    Args:
-        result: Estimates over time, for the plot.
-        document: Plain values, for the JSON file.
-        directory: Directory, which must exist.
-    """
+    """Writes ``locate.json`` and ``locate.png`` into an existing directory."""
     write_json(document, directory / "locate.json")
     plot_locate(result).savefig(directory / "locate.png", dpi=150)
 
 
-def plot_locate(result: LocateResult) -> Figure:
+def plot_locate(result: LocatedSource) -> Figure:
     """Plots the angles and the range over time, and a plan view.
 
     Error bars show one standard deviation.
-
-    Args:
-        result: Estimates over time.
-
-    Returns:
-        The figure.
     """
     known = [
         (name, label)
@@ -73,13 +61,13 @@ def plot_locate(result: LocateResult) -> Figure:
     return figure
 
 
-def _title(result: LocateResult) -> str:
+def _title(result: LocatedSource) -> str:
     heard = f"heard in {len(result.estimates)} of {result.frames} frames"
     if result.heard.steady:
         heard += "; steady sound: the number of sources is unknown"
     elif len(result.heard.sources) > 1:
         heard += f"; {len(result.heard.sources)} sources"
-    summary = result.summary()
+    summary = result.main_source()
     if not result.estimates or "range" in summary["observable"]:
         return heard
     if any(each.range_m is not None for each in result.estimates):
@@ -87,7 +75,7 @@ def _title(result: LocateResult) -> str:
     return f"{heard}; range not observable"
 
 
-def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
+def _over_time(axes: Axes, result: LocatedSource, name: str) -> None:
     """Plots estimates with error bars, and the summary as a line with an error band."""
     std_name = name.replace("_deg", "_std_deg").replace("_m", "_std_m")
     rows = [
@@ -96,15 +84,17 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
         if getattr(e, name) is not None
     ]
     times, values, errors = np.array(rows).T
-    summary = result.summary()
-    centre, std = summary[name], summary[std_name]
-    if name == "bearing_deg" and centre is not None:
+    summary = result.main_source()
+    center, std = summary[name], summary[std_name]
+    if name == "bearing_deg" and center is not None:
         # A bearing near 180 deg must not jump from the top to the bottom of the plot.
         # The axis labels show the same wrapped bearings as the table.
-        middle = _middle_deg(result, centre)
+        middle = _middle_deg(result, center)
         values = middle + (values - middle + 180.0) % 360.0 - 180.0
-        centre = middle + (centre - middle + 180.0) % 360.0 - 180.0
-        axes.yaxis.set_major_formatter(lambda value, _: f"{_wrapped_deg(value):g}")
+        center = middle + (center - middle + 180.0) % 360.0 - 180.0
+        axes.yaxis.set_major_formatter(
+            lambda value, _: f"{wrapped_deg(round(value, 6)):g}"
+        )
         _tracks(axes, result, middle)
     axes.errorbar(
         times,
@@ -115,16 +105,15 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
         linewidth=0.8,
         color=COLOURS["estimate"],
     )
-    if centre is not None:
-        axes.axhline(centre, color=COLOURS["source"], linewidth=1.2)
-        ends = centre - std, centre + std
+    if center is not None:
+        axes.axhline(center, color=COLOURS["source"], linewidth=1.2)
+        ends = center - std, center + std
         axes.axhspan(*ends, color=COLOURS["source"], alpha=0.15, linewidth=0)
     draw_grid(axes)
 
 
-def _others(axes: Axes, result: LocateResult, length: float) -> None:
-    """Draws the bearings of all sources except the main source."""
-    main = result.summary()["bearing_deg"]
+def _others(axes: Axes, result: LocatedSource, length: float) -> None:
+    main = result.main_source()["bearing_deg"]
     if main is None or len(result.heard.sources) < 2:
         return
     bearings = [source.bearing_deg for source in result.heard.sources]
@@ -136,7 +125,7 @@ def _others(axes: Axes, result: LocateResult, length: float) -> None:
         axes.plot((0, x), (0, y), "-.", color=COLOURS["source"], label=label)
 
 
-def _middle_deg(result: LocateResult, main: float) -> float:
+def _middle_deg(result: LocatedSource, main: float) -> float:
     """Returns the bearing opposite the widest gap between the sources, deg.
 
     If there are fewer than two sources, it is the bearing of the main source.
@@ -149,7 +138,7 @@ def _middle_deg(result: LocateResult, main: float) -> float:
     return float(bearings[widest] + 0.5 * gaps[widest] - 180.0)
 
 
-def _tracks(axes: Axes, result: LocateResult, middle: float) -> None:
+def _tracks(axes: Axes, result: LocatedSource, middle: float) -> None:
     """Plots each track in its own color if there are several. Pauses stay blank."""
     if len(result.heard.tracks) < 2:
         return
@@ -158,20 +147,14 @@ def _tracks(axes: Axes, result: LocateResult, middle: float) -> None:
         around = middle + (bearing - middle + 180.0) % 360.0 - 180.0
         steps = np.diff(around, prepend=around[0]), np.diff(t_s, prepend=t_s[0])
         around[(np.abs(steps[0]) > 180.0) | (steps[1] > _GAP_S)] = np.nan
-        colour = ROBOT_COLOURS[k % len(ROBOT_COLOURS)]
-        axes.plot(t_s, around, color=colour, label=f"{track.identity}")
+        color = ROBOT_COLOURS[k % len(ROBOT_COLOURS)]
+        axes.plot(t_s, around, color=color, label=f"{track.identity}")
     axes.legend(
         fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=8
     )
 
 
-def _wrapped_deg(angle: float) -> float:
-    """Returns an angle wrapped to (-180, 180], deg."""
-    return 180.0 - (180.0 - round(angle, 6)) % 360.0
-
-
-def _plan(axes: Axes, result: LocateResult) -> None:
-    """Draws the microphones and bearings from above, in the frame of the geometry."""
+def _plan(axes: Axes, result: LocatedSource) -> None:
     places = result.shape.p_AM[:, :2]
     ranges = [e.range_m for e in result.estimates if e.range_m is not None]
     size = max(1.6 * float(np.abs(places).max()), 1.15 * max(ranges, default=0.0))
@@ -179,7 +162,7 @@ def _plan(axes: Axes, result: LocateResult) -> None:
         if e.bearing_deg is not None:
             x, y = polar_point(e.range_m or 0.85 * size, e.bearing_deg)
             axes.plot((0, x), (0, y), color=COLOURS["estimate"], alpha=0.25)
-    summary = result.summary()
+    summary = result.main_source()
     if summary["bearing_deg"] is not None:
         x, y = polar_point(0.95 * size, summary["bearing_deg"])
         axes.plot((0, x), (0, y), color=COLOURS["source"], label="source")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.heard_sources import HeardSource, HeardSources
+from analysis.recordings.recording_search import MAD_TO_STD
 from analysis.recordings.source_placement import PlacedSource
 from systems.sound.array_shape import ArrayShape
 
@@ -21,10 +22,6 @@ _NEAR_DEG = 15.0
 
 # Least error that counts in a weighted median, as a share of the median error.
 _LEAST_ERROR = 0.3
-
-# Ratio of the standard deviation to the median absolute deviation of normally
-# distributed values.
-_TO_STANDARD = 1.4826
 
 
 @dataclass(frozen=True)
@@ -69,30 +66,32 @@ class SourceEstimate:
             The estimate, with angles in deg and the range in m.
         """
         fix, systematic = placed.fix, placed.systematic
-        bearing = math.isfinite(fix.bearing_std)
-        elevation = fix.elevation_std is not None and math.isfinite(fix.elevation_std)
+
+        def degrees(angle: float | None, std: float | None) -> float | None:
+            if angle is None or std is None or not math.isfinite(std):
+                return None
+            return math.degrees(angle)
+
+        bearing = degrees(fix.bearing, fix.bearing_std)
+        ranged = fix.range_valid
         return cls(
             t_s=t_s,
-            bearing_deg=_wrapped_deg(math.degrees(fix.bearing)) if bearing else None,
-            bearing_std_deg=math.degrees(fix.bearing_std) if bearing else None,
-            bearing_systematic_deg=(
-                math.degrees(systematic.bearing_std) if bearing else None
+            bearing_deg=None if bearing is None else wrapped_deg(bearing),
+            bearing_std_deg=degrees(fix.bearing_std, fix.bearing_std),
+            bearing_systematic_deg=degrees(systematic.bearing_std, fix.bearing_std),
+            elevation_deg=degrees(fix.elevation, fix.elevation_std),
+            elevation_std_deg=degrees(fix.elevation_std, fix.elevation_std),
+            elevation_systematic_deg=degrees(
+                systematic.elevation_std, fix.elevation_std
             ),
-            elevation_deg=math.degrees(fix.elevation or 0.0) if elevation else None,
-            elevation_std_deg=(
-                math.degrees(fix.elevation_std or 0.0) if elevation else None
-            ),
-            elevation_systematic_deg=(
-                math.degrees(systematic.elevation_std or 0.0) if elevation else None
-            ),
-            range_m=fix.range if fix.range_valid else None,
-            range_std_m=fix.range_std if fix.range_valid else None,
-            range_systematic_m=systematic.range_std if fix.range_valid else None,
+            range_m=fix.range if ranged else None,
+            range_std_m=fix.range_std if ranged else None,
+            range_systematic_m=systematic.range_std if ranged else None,
         )
 
 
 @dataclass(frozen=True, repr=False)
-class LocateResult:
+class LocatedSource:
     """Estimates for the stretches of a recording in which a source was heard."""
 
     array: dict[str, Any]
@@ -112,9 +111,9 @@ class LocateResult:
 
     def __repr__(self) -> str:
         heard = f"{len(self.estimates)} of {self.frames} stretches heard"
-        return f"<LocateResult {self.shape.count} microphones, {heard}>"
+        return f"<{type(self).__name__} {self.shape.count} microphones, {heard}>"
 
-    def summary(self) -> dict[str, Any]:
+    def main_source(self) -> dict[str, Any]:
         """Summarizes the main source by medians, and lists what could not be measured.
 
         The estimates of the main source are the following:
@@ -192,20 +191,20 @@ class LocateResult:
         other = math.degrees(math.atan2(u[1], u[0]))
         return [
             {
-                "bearing_deg": _wrapped_deg(other),
+                "bearing_deg": wrapped_deg(other),
                 "elevation_deg": None
                 if elevation is None
                 else math.degrees(math.atan2(u[2], math.hypot(u[0], u[1]))),
             }
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
         """Returns the JSON document that the command line writes."""
         return {
             "schema_version": 1,
             "array": self.array,
             "estimates": [asdict(estimate) for estimate in self.estimates],
-            "summary": self.summary(),
+            "summary": self.main_source(),
             "sources": [asdict(source) for source in self.heard.sources],
             "tracks": [asdict(track) for track in self.heard.tracks],
         }
@@ -214,10 +213,6 @@ class LocateResult:
 def _main_source(
     estimates: list[SourceEstimate], sources: Sequence[HeardSource]
 ) -> list[SourceEstimate]:
-    """Returns the estimates of the main source.
-
-    If most estimates are not near any common direction, these are all estimates.
-    """
     if not estimates:
         return []
     azimuth = np.radians([e.bearing_deg or 0.0 for e in estimates])
@@ -238,14 +233,9 @@ def _main_source(
 def _near(
     directions: NDArray[np.float64], angles: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Returns whether each angle is near each direction.
+    """Returns whether each angle is within 15 deg of each direction, both in rad.
 
-    Args:
-        directions: (d,) directions, rad.
-        angles: (e,) angles, rad.
-
-    Returns:
-        (d, e) True where the angle is within 15 deg of the direction.
+    The shape is (directions, angles).
     """
     off = np.angle(np.exp(1j * (angles - directions[:, np.newaxis])))
     return np.asarray(np.abs(off) <= math.radians(_NEAR_DEG))
@@ -254,60 +244,44 @@ def _near(
 def _median(
     estimates: Sequence[tuple[float | None, float | None]],
 ) -> tuple[float | None, float | None]:
-    """Computes the weighted median of values, and the error of a single value.
+    """Returns the weighted median of values, and the error of a single value.
 
-    The weight of a value is the inverse square of its error. A larger number of values
-    does not reduce the error of the result, because the values may have a common error.
-
-    Args:
-        estimates: Pairs of a value and its standard deviation. Pairs with None are
-            ignored.
-
-    Returns:
-        median: The weighted median. None if there are no values.
-        error: Scatter of the values around the median, or the median of their standard
-            deviations, whichever is larger. None if there are no values.
+    Each estimate is a value and its standard deviation. The weight of a value is
+    the inverse square of its error. A larger number of values does not reduce the error
+    of the result, because the values may have a common error. The error is the scatter
+    of the values around the median, or the median of their standard deviations,
+    whichever is larger.
     """
     rows = [row for row in estimates if row[0] is not None and row[1] is not None]
     if not rows:
         return None, None
     values, errors = np.array(rows, dtype=np.float64).T
     weights = 1.0 / np.maximum(errors, _LEAST_ERROR * np.median(errors)) ** 2
-    centre = _weighted_median(values, weights)
-    scatter = _TO_STANDARD * float(np.median(np.abs(values - centre)))
-    return centre, max(scatter, float(np.median(errors)))
+    order = np.argsort(values)
+    below = np.cumsum(weights[order]) - 0.5 * weights[order]
+    center = float(np.interp(0.5 * weights.sum(), below, values[order]))
+    scatter = MAD_TO_STD * float(np.median(np.abs(values - center)))
+    return center, max(scatter, float(np.median(errors)))
 
 
 def _usual(values: Sequence[float | None]) -> float | None:
-    """Returns the median of the values that are not None, or None if there are none."""
     known = [value for value in values if value is not None]
     return float(np.median(known)) if known else None
-
-
-def _weighted_median(
-    values: NDArray[np.float64], weights: NDArray[np.float64]
-) -> float:
-    order = np.argsort(values)
-    below = np.cumsum(weights[order]) - 0.5 * weights[order]
-    return float(np.interp(0.5 * weights.sum(), below, values[order]))
 
 
 def _median_angle(
     estimates: Sequence[tuple[float | None, float | None]],
 ) -> tuple[float | None, float | None]:
-    """Computes the weighted median of angles in deg, like ``_median``.
-
-    The angles are wrapped around their mean direction first.
-    """
+    """Computes ``_median`` of angles in deg, wrapped around their mean direction."""
     known = [row for row in estimates if row[0] is not None]
     mean = sum(cmath.exp(1j * math.radians(angle or 0.0)) for angle, _ in known)
-    centre = math.degrees(cmath.phase(mean))
+    center = math.degrees(cmath.phase(mean))
     offset, scatter = _median(
-        [(_wrapped_deg((angle or 0.0) - centre), error) for angle, error in known]
+        [(wrapped_deg((angle or 0.0) - center), error) for angle, error in known]
     )
-    return None if offset is None else _wrapped_deg(centre + offset), scatter
+    return None if offset is None else wrapped_deg(center + offset), scatter
 
 
-def _wrapped_deg(angle: float) -> float:
+def wrapped_deg(angle: float) -> float:
     """Returns an angle wrapped to (-180, 180], deg."""
     return 180.0 - (180.0 - angle) % 360.0

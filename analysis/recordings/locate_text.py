@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from analysis.recordings.locate_result import LocateResult, SourceEstimate
+from analysis.recordings.locate_result import LocatedSource, SourceEstimate
 
 _WHY_NOTHING = (
     "; the recording is silent or noise, or the positions (in m) or the speed of "
@@ -19,17 +19,8 @@ _COLUMNS = (
 )
 
 
-def locate_text(result: LocateResult) -> str:
-    """Describes a result by a summary and one row per estimate.
-
-    The text does not contain the faults of the channels.
-
-    Args:
-        result: Estimates over time.
-
-    Returns:
-        The text, with several lines.
-    """
+def locate_text(result: LocatedSource) -> str:
+    """Describes a result by a summary and one row per estimate."""
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
     if not result.estimates:
         return f"{heard}: nothing to locate{_WHY_NOTHING}"
@@ -40,8 +31,8 @@ def locate_text(result: LocateResult) -> str:
     return "\n".join(lines)
 
 
-def _direction(result: LocateResult) -> list[str]:
-    summary = result.summary()
+def _direction(result: LocatedSource) -> list[str]:
+    summary = result.main_source()
     parts = []
     if summary["bearing_deg"] is not None:
         parts.append(
@@ -69,8 +60,8 @@ def _direction(result: LocateResult) -> list[str]:
     return lines
 
 
-def _range(result: LocateResult) -> str:
-    summary = result.summary()
+def _range(result: LocatedSource) -> str:
+    summary = result.main_source()
     ranges = [e.range_m for e in result.estimates if e.range_m is not None]
     if summary["range_m"] is None and ranges:
         return (
@@ -87,11 +78,7 @@ def _range(result: LocateResult) -> str:
     )
 
 
-def _sources(result: LocateResult) -> list[str]:
-    """Describes all sources if there are several.
-
-    For a steady sound, the text states that the number of sources is unknown.
-    """
+def _sources(result: LocatedSource) -> list[str]:
     sources = result.heard.sources
     if result.heard.steady:
         return ["the sound is steady: the number of sources is unknown"]

@@ -10,19 +10,20 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from analysis.arrays.steered_response import (
-    LAG_DENSITY,
     SearchGrid,
     centroid_delays,
     steered_response,
 )
 from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
 from analysis.recordings.recording_spectra import RecordingSpectra
-from systems.delays.correlations import correlations_at_lags
 from systems.delays.delay_sets import consistent_lags
 from systems.sound.array_shape import ArrayShape
+
+#: Ratio of the standard deviation to the median absolute deviation of normally
+#: distributed values.
+MAD_TO_STD = 1.4826
 
 # Least mean weight of a stretch with a source. Other stretches are silence or echoes.
 _LEAST_WEIGHT = 0.02
@@ -33,9 +34,9 @@ _LEAST_WEIGHT = 0.02
 _DEVIATIONS = 5.0
 _LEAST_DIRECT = 0.1
 # The neighbors of a stretch help to choose among its peaks:
-# - _NEIGHBOURS: number of neighbors before and after the stretch.
+# - _NEIGHBORS: number of neighbors before and after the stretch.
 # - _HELP: weight of their mean response.
-_NEIGHBOURS, _HELP = 4, 0.5
+_NEIGHBORS, _HELP = 4, 0.5
 # Several sets of lags are compared for a single short sound, or if the microphone
 # positions are too uncertain.
 # - _CANDIDATES: largest number of sets.
@@ -99,48 +100,13 @@ class RecordingSearch:
     @cached_property
     def grid(self) -> SearchGrid:
         """Positions to search."""
-        return SearchGrid.of(
-            self.shape, self.c, self.recording.high_hz, self._length / self._window_s
-        )
-
-    @property
-    def _window_s(self) -> float:
-        return self.recording.window.size / self.recording.sample_rate_hz
-
-    @cached_property
-    def _length(self) -> int:
-        """Number of samples of a correlation that covers a whole window."""
-        least = LAG_DENSITY * self.recording.high_hz * self._window_s
-        return int(fft.next_fast_len(math.ceil(least), real=True))
-
-    def _correlations(
-        self, cross: NDArray[np.complex64], slack: int = 0
-    ) -> NDArray[np.float32]:
-        """Computes the correlations of p pairs of microphones.
-
-        Args:
-            cross: (p, f) cross-spectra of the pairs. For each pair, the magnitudes add
-                up to at most 1.
-            slack: Number of lags to add on either side.
-
-        Returns:
-            (p, 2 m + 1) correlations. Lag 0 is in the middle.
-        """
-        m = self.grid.max_lag + slack
-        values = correlations_at_lags(cross, self.recording.bins, self._length, m)
-        return values * np.float32(0.5 * self._length)
+        rate = self.recording.sample_rate_hz
+        window_s = self.recording.window.size / rate
+        return SearchGrid.of(self.shape, self.c, self.recording.high_hz, window_s)
 
     def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
-        """Computes the steered response of each grid position.
-
-        Args:
-            cross: (p, f) cross-spectra of the pairs. For each pair, the magnitudes add
-                up to at most 1.
-
-        Returns:
-            (g,) responses of the g grid positions.
-        """
-        return steered_response(self._correlations(cross), self.grid)
+        correlations = self.grid.correlations(cross, self.recording.bins)
+        return steered_response(correlations, self.grid)
 
     @cached_property
     def diffuse_response(self) -> NDArray[np.float32]:
@@ -152,12 +118,9 @@ class RecordingSearch:
         return self._responses(cross.astype(np.complex64))
 
     def mean_response(self) -> float:
-        """Averages the greatest response of each stretch.
+        """Computes the weighted mean of the greatest responses of all stretches.
 
         The mean measures how well all pairs of channels agree on a source position.
-
-        Returns:
-            Mean over the stretches, weighted by the weights of the stretches.
         """
         weights = [float(self.recording.weights[s].mean()) for s in self.stretches]
         best = [
@@ -167,17 +130,13 @@ class RecordingSearch:
         return float(np.average(best, weights=np.array(weights) + 1e-30))
 
     def sightings(self) -> Iterator[Sighting]:
-        """Finds the stretches that have a source.
-
-        Yields:
-            The stretches with a source, in the order of time.
-        """
+        """Finds the stretches that have a source, in the order of time."""
         held: deque[tuple[slice, float, NDArray[np.float32]]] = deque()
         near = np.zeros(len(self.grid.lags))
         weight = 0.0
         queue = iter(self.stretches)
         middle = 0
-        for k in range(len(self.stretches) + _NEIGHBOURS):
+        for k in range(len(self.stretches) + _NEIGHBORS):
             new = next(queue, None)
             if new is not None:
                 value = float(self.recording.weights[new].mean())
@@ -185,14 +144,14 @@ class RecordingSearch:
                 held.append((new, value, response))
                 near += value * response
                 weight += value
-            if k < _NEIGHBOURS:
+            if k < _NEIGHBORS:
                 continue
             stretch, value, response = held[middle]
             found = self._sighting(stretch, value, response, near / max(weight, 1e-30))
             if found is not None:
                 yield found
             middle += 1
-            if middle > _NEIGHBOURS:
+            if middle > _NEIGHBORS:
                 _, value, response = held.popleft()
                 near -= value * response
                 weight -= value
@@ -252,11 +211,12 @@ class RecordingSearch:
           position may lie on a side lobe instead of the peak.
         """
         weight = float(self.recording.weights[stretch].sum())
-        rate = self._length / self._window_s
+        rate = self.grid.lag_rate_hz
         slack = math.ceil(self.slack_s * rate)
         reach = np.ceil(self.shape.distances_m / self.c * rate).astype(np.int64)
+        cross = self._cross(stretch) / weight
         sets = consistent_lags(
-            self._correlations(self._cross(stretch) / weight, slack),
+            self.grid.correlations(cross, self.recording.bins, slack),
             self.shape.pairs,
             reach + slack,
             _CANDIDATES,
@@ -286,7 +246,6 @@ class RecordingSearch:
         return diffuse + max(_DEVIATIONS * deviation, least)
 
     def _delays(self, place: int, stretch: slice) -> AlignedDelays | None:
-        """Estimates delays after aligning the channels for a grid position."""
         grid = self.grid
         chosen = slice(place, place + 1)
         later = centroid_delays(

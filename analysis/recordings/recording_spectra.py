@@ -5,6 +5,10 @@ snapshot at a frequency grows with its power relative to two levels. The first l
 the noise. The second level is the remaining echo of earlier snapshots in the room. The
 onset of a sound therefore has the largest weight. The onset arrives directly from the
 source, but the later sound also arrives from the walls.
+
+A recording of short sounds has one snapshot per sound instead. A click or a chirp of a
+few milliseconds ends before its first echo arrives, or soon after. A window around such
+a sound contains the direct sound and few echoes, even if many echoes follow.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
+from scipy.ndimage import maximum_filter1d
 
 WINDOW_S = 0.032
 #: Least length of a window, as a multiple of the travel time of sound along the array.
@@ -32,6 +37,39 @@ ABOVE_NOISE = 2.0
 # _ECHO_SHARE: share of the expected echo that is subtracted.
 _REVERBERATION_S = 0.5
 _ECHO_SHARE = 0.8
+
+# Time from the start of a window to the onset, s, in addition to the travel time of
+# sound along the array. The window rises over this time, and falls over the same time
+# at its end.
+_BEFORE_S = 0.003
+#: Possible lengths of a window after the onset, s. The first is for clicks, the others
+#: are for longer sounds.
+AFTER_S = (0.014, 0.04, 0.11)
+
+# An onset is a rise of the energy above two levels: the level for some time before it,
+# and the level of the quiet parts of the recording.
+# - _STEP_S: time step of the energy, s.
+# - _QUIET_BEFORE_S: duration of the comparison before the onset, s.
+# - _ATTACK: longest duration of the rise, steps.
+# - _RISE_DB: least rise of an onset, dB.
+# - _BEGUN_DB: rise at which the sound has begun, dB.
+# - _QUIET_ENERGY: quantile of the energy that counts as the level of the quiet parts.
+_STEP_S = 0.001
+_QUIET_BEFORE_S = 0.05
+_ATTACK = 15
+_RISE_DB, _BEGUN_DB = 10.0, 5.0
+_QUIET_ENERGY = 0.2
+
+# _MOST: share of the energy of a short sound, echoes included, that arrives within
+#   _SHORT_S of its onset. It is also the least share of short sounds in a recording of
+#   short sounds.
+# _SHORT_S: longest duration of a short sound, s.
+# _LONGEST_S: longest time that counts as part of one sound, s.
+_MOST, _SHORT_S = 0.9, 0.25
+_LONGEST_S = 0.6
+
+# Highest corner frequency of the filter, as a share of the sample rate.
+_HIGHEST = 0.49
 
 
 @dataclass(frozen=True)
@@ -85,16 +123,10 @@ class RecordingSpectra:
     def spectra(
         self, snapshots: slice, lags: NDArray[np.int64] | None = None
     ) -> NDArray[np.complex64]:
-        """Computes the spectra of some snapshots within the band.
+        """Computes the (n, k, f) spectra of k snapshots within the band.
 
-        Args:
-            snapshots: Snapshots to use.
-            lags: (n,) shift of each channel, samples. A positive shift reads later
-                samples. None: no shifts.
-
-        Returns:
-            (n, k, f) spectra of n channels, k snapshots and f bins, in the unit of the
-            samples.
+        ``lags`` shifts each channel by a number of samples. A positive shift reads
+        later samples.
         """
         size = self.window.size
         if lags is None:
@@ -146,3 +178,102 @@ class RecordingSpectra:
         direct = 1.0 - np.minimum(_ECHO_SHARE * echo, power) / power
         # Digital silence has the weight 0, even long after the last echo.
         return (above * direct * (self.power > tiny)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class OnsetSpectra(RecordingSpectra):
+    """Spectra of a recording of short sounds. Each sound is one snapshot."""
+
+    after_s: float = AFTER_S[0]
+    """Length of a window after the onset, s."""
+
+    @cached_property
+    def window(self) -> NDArray[np.float32]:
+        """(w,) window of a snapshot. It rises before the onset and falls at its end."""
+        soft = round(_BEFORE_S * self.sample_rate_hz)
+        flat = round(self.after_s * self.sample_rate_hz)
+        rise = np.sin(0.5 * math.pi * (np.arange(soft) + 0.5) / soft) ** 2
+        return np.concatenate((rise, np.ones(flat), rise[::-1])).astype(np.float32)
+
+    @cached_property
+    def energy(self) -> NDArray[np.float64]:
+        """(k,) mean power of all channels within the band, in steps of 1 ms."""
+        from scipy.signal import butter, sosfilt  # slow import, about 1 s
+
+        step = round(_STEP_S * self.sample_rate_hz)
+        # The filter is causal, so no part of a sound appears before its onset.
+        high_hz = min(self.high_hz, _HIGHEST * self.sample_rate_hz)
+        band = butter(
+            2, (self.low_hz, high_hz), "band", fs=self.sample_rate_hz, output="sos"
+        )
+        heard = sosfilt(band, self.channels, axis=1)
+        count = heard.shape[1] // step
+        power = np.mean(heard[:, : count * step] ** 2, axis=0, dtype=np.float64)
+        return power.reshape(count, step).mean(axis=1)
+
+    @cached_property
+    def onsets(self) -> NDArray[np.int64]:
+        """(s,) numbers of the 1 ms steps at which sounds begin."""
+        energy, before = self.energy, round(_QUIET_BEFORE_S / _STEP_S)
+        if energy.size <= before:
+            return np.zeros(0, dtype=np.int64)
+        # Largest energy in the 50 ms before the possible attack.
+        past = maximum_filter1d(energy, before, origin=before - 1 - before // 2)
+        past = np.concatenate((np.full(_ATTACK, np.inf), past[:-_ATTACK]))
+        past = np.maximum(past, np.quantile(energy, _QUIET_ENERGY))
+        high = energy > 10.0 ** (_RISE_DB / 10.0) * past
+        high[: before + _ATTACK] = False
+        steps = np.flatnonzero(high)
+        begun = steps[np.diff(steps, prepend=-before) >= before]
+        # A sound with a slow attack begins before it reaches the threshold.
+        for row, k in enumerate(begun):
+            rising = energy[k - _ATTACK : k] > 10.0 ** (_BEGUN_DB / 10.0) * past[k]
+            quiet = np.flatnonzero(~rising)
+            begun[row] = k - _ATTACK + (quiet[-1] + 1 if quiet.size else 0)
+        return begun
+
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """(s,) numbers of the first samples of the snapshots."""
+        step = round(_STEP_S * self.sample_rate_hz)
+        lead = self.travel_s * self.sample_rate_hz + self._soft
+        first = self.onsets * step - round(lead)
+        last = self.channels.shape[1] - self.window.size
+        return first[(first >= 0) & (first <= last)]
+
+    @property
+    def are_most(self) -> bool:
+        """Whether most of the energy in the recording belongs to short sounds."""
+        energy = self.energy - np.quantile(self.energy, _QUIET_ENERGY)
+        ends = np.append(self.onsets, energy.size)[1:]
+        longest = round(_LONGEST_S / _STEP_S)
+        short, whole = 0.0, float(np.maximum(energy, 0.0).sum())
+        for first, last in zip(self.onsets, ends, strict=True):
+            sound = np.maximum(energy[first : min(last, first + longest)], 0.0)
+            come = np.cumsum(sound)
+            if np.searchsorted(come, _MOST * come[-1]) * _STEP_S <= _SHORT_S:
+                short += float(come[-1])
+        return short > _MOST * whole > 0.0
+
+    @property
+    def _soft(self) -> float:
+        return _BEFORE_S * self.sample_rate_hz
+
+    @cached_property
+    def noise_before(self) -> NDArray[np.float32]:
+        """(s, f) power in a window that ends where the snapshot begins."""
+        take = self.starts[:, np.newaxis] + np.arange(-self.window.size, 0)
+        frames = self.channels[:, np.maximum(take, 0)] * self.window
+        spectra = fft.rfft(frames, axis=-1)[..., self.bins]
+        return np.mean(np.abs(spectra) ** 2, axis=0)
+
+    @cached_property
+    def weights(self) -> NDArray[np.float32]:
+        """(s, f) weight of each snapshot and frequency, 0 to 1."""
+        power = np.maximum(self.power, np.finfo(np.float32).tiny)
+        kernel = np.full(5, 0.2, dtype=np.float32)
+        noise = np.array(
+            [np.convolve(row, kernel, "same") for row in self.noise_before]
+        )
+        above = 1.0 - np.minimum(ABOVE_NOISE * noise, power) / power
+        return (above * (self.power > np.finfo(np.float32).tiny)).astype(np.float32)

@@ -76,14 +76,9 @@ class PlacedSource:
 def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     """Estimates the position of the source of a sound.
 
-    Args:
-        delays: Delays of the channels, and their errors.
-        array: The microphones and the errors of their description.
-
-    Returns:
-        The source position. It has a range if the standard deviation of the range is at
-        most the share ``largest_range_error`` of the range. None if no position fits
-        the delays, or if the bearing is too uncertain.
+    A range is given if its standard deviation is at most the share
+    ``largest_range_error`` of the range. The result is None if no position fits the
+    delays, or if the bearing is too uncertain.
     """
     placed = _placed(delays, array)
     # An upright row cannot measure the bearing, but it measures the elevation.
@@ -93,24 +88,14 @@ def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | Non
 
 
 def has_place(delays: AlignedDelays, array: KnownArray) -> bool:
-    """Returns whether some source position fits the delays.
-
-    The bearing of the position may be arbitrarily uncertain.
-
-    Args:
-        delays: Delays of the channels, and their errors.
-        array: The microphones and the errors of their description.
-
-    Returns:
-        False if no source position fits the delays.
-    """
+    """Returns whether some source position fits the delays, however uncertain."""
     return _placed(delays, array) is not None
 
 
 def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     tau, shape, c = delays.tau, array.shape, array.c
     own = delays.covariance + _reflections(delays, array)
-    bent = _inverse_range_std(shape)
+    bent = min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
     lying = shape.dimension == 2 and shape.kind == "plane"
     u = _direction(tau, own, array)
     far = locate_far_source(
@@ -168,13 +153,7 @@ def _near(
     u: NDArray[np.float64],
     array: KnownArray,
 ) -> tuple[SourceFix, NDArray[np.float64]]:
-    """Estimates a source position at a finite range.
-
-    Returns:
-        fix: The source position.
-        allowed: (n - 1, n - 1) covariance of the delays from the errors of the array,
-            for this position, s^2.
-    """
+    """Estimates a position at a finite range, and the array's delay errors for it."""
     allowed = _budget(u, 0.0, array)
     for _ in range(_ROUNDS):
         near = locate_source(tau, own + allowed, array.shape, array.c)
@@ -233,18 +212,7 @@ def _of_budget(
     shape: ArrayShape,
     c: float,
 ) -> SourceFix:
-    """Computes the errors of a source position from one part of the delay errors.
-
-    Args:
-        near: Source position at a finite range.
-        whole: (n - 1, n - 1) covariance of all delay errors, s^2.
-        allowed: (n - 1, n - 1) covariance of the part to use, s^2.
-        shape: The n microphones.
-        c: Speed of sound, m/s.
-
-    Returns:
-        The same position with the errors from this part.
-    """
+    """Returns a position with the errors from the part ``allowed`` of delay errors."""
     to_microphones = near.p_AS - shape.p_AM
     to_microphones /= np.linalg.norm(to_microphones, axis=1, keepdims=True)
     slopes = (to_microphones[1:] - to_microphones[0]) / c
@@ -273,33 +241,21 @@ def _reflections(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64
 
 
 def tolerance(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
-    """Computes the covariance of all delay errors except noise, for a distant source.
+    """Computes the (n - 1, n - 1) covariance of all delay errors except noise, s^2.
 
-    Args:
-        delays: n - 1 delays and their coherence.
-        array: The n microphones and the errors of their description.
-
-    Returns:
-        (n - 1, n - 1) covariance to add to the covariance of the noise, s^2.
+    It holds for a distant source, and is to be added to the covariance of the noise.
     """
     reflected = _reflections(delays, array)
     u = _direction(delays.tau, delays.covariance + reflected, array)
     return reflected + _budget(u, 0.0, array)
 
 
-def _inverse_range_std(shape: ArrayShape) -> float:
-    """Returns the prior standard deviation of the inverse range, 1/m."""
-    return min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
-
-
 def _limit(freedom: int) -> float:
-    """Returns the largest chi-square of a source position that fits the delays."""
     freedom = max(freedom, 1)
     return freedom + _MISFIT_DEVIATIONS * math.sqrt(2.0 * freedom)
 
 
 def _level(fix: SourceFix) -> SourceFix:
-    """Returns the azimuth of a source without its elevation."""
     u = np.array([math.cos(fix.bearing), math.sin(fix.bearing)])
     across = np.array([-u[1], u[0]])
     covariance = fix.bearing_std**2 * np.outer(across, across)

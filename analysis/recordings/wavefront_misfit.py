@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.wave_fronts import wave_front
 from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.channel_faults import ChannelFault
-from analysis.recordings.recording_search import Sighting
+from analysis.recordings.recording_search import MAD_TO_STD, Sighting
 from analysis.recordings.source_placement import tolerance
 from systems.hearing.multilateration import locate_source, whitening_matrix
 from systems.hearing.source_fix import NEAREST_M
@@ -29,10 +30,6 @@ _LEAST_STRETCHES = 3
 
 # Largest number of channels in one message.
 _MOST_NAMED = 8
-
-# Ratio of the standard deviation to the median absolute deviation of normally
-# distributed values.
-_TO_STANDARD = 1.4826
 
 # Least information about the lateness of a channel, 1/s^2. It corresponds to a standard
 # deviation of 1 s, which means that nothing is known.
@@ -68,12 +65,7 @@ def channel_lateness(
 ) -> Lateness | None:
     """Estimates how late each channel is, from the misfit of the wave fronts.
 
-    Args:
-        sightings: Stretches of the recording with a source, their delays and errors.
-        array: The n microphones and the errors of their description.
-
-    Returns:
-        The lateness of each channel. None if there are too few stretches.
+    The result is None if there are too few stretches.
     """
     every = -(-len(sightings) // _MOST_STRETCHES) or 1
     chosen = sightings[::every]
@@ -86,7 +78,7 @@ def channel_lateness(
     late, info, alike, misfit = (np.array(part) for part in zip(*found, strict=True))
     middle = np.median(late, axis=0)
     # The noise averages out over the stretches. Half of the stretches are independent.
-    scatter = _TO_STANDARD * np.median(np.abs(late - middle), axis=0)
+    scatter = MAD_TO_STD * np.median(np.abs(late - middle), axis=0)
     deviation = np.sqrt(np.median(alike, axis=0) + 2.0 * scatter**2 / len(late))
     explained = (2.0 * late * middle - middle**2) * info
     return Lateness(
@@ -101,13 +93,7 @@ def late_channel(
 ) -> ChannelFault | None:
     """Finds the channel that is late, if the evidence is strong.
 
-    Args:
-        sightings: Stretches of the recording with a source, their delays and errors.
-        array: The n microphones and the errors of their description.
-
-    Returns:
-        The late channel and its lateness. Several channels are listed if they explain
-        the misfit equally well. None if there is no strong evidence.
+    Several channels are listed if they explain the misfit equally well.
     """
     found = channel_lateness(sightings, array)
     if found is None:
@@ -131,16 +117,11 @@ def late_channel(
 def _of_stretch(
     sighting: Sighting, shape: ArrayShape, array: KnownArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
-    """Estimates the lateness of each channel in one stretch.
+    """Estimates the lateness of each channel in a stretch if only this channel is late.
 
-    Each estimate assumes that only this channel is late.
-
-    Returns:
-        late: (n,) lateness of each channel, s.
-        information: (n,) inverse variance of each lateness, 1/s^2.
-        alike: (n,) part of each variance from errors that are the same in all
-            stretches, s^2.
-        misfit: Total misfit of the stretch, a sum of squared whitened residuals.
+    The results are the (n,) lateness, s, its inverse variance, the part of its variance
+    from errors that are the same in all stretches, and the sum of squared whitened
+    residuals of the stretch.
     """
     c = array.c
     allowed = tolerance(sighting, array)
@@ -177,32 +158,22 @@ def _fit(
     shape: ArrayShape,
     c: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fits a source position to delays.
+    """Fits a source position to delays that ``root`` whitens, beginning at u / w.
 
-    Args:
-        tau: (n - 1,) delays, s.
-        root: (n - 1, n - 1) matrix that whitens delays.
-        u: (3,) initial unit vector to the source.
-        w: Initial inverse range, 1/m.
-        shape: The n microphones.
-        c: Speed of sound, m/s.
-
-    Returns:
-        residual: (n,) whitened residual of the best position. The last value is that of
-            the prior of the range.
-        slopes: (n, 3) derivatives of the modeled values with respect to two coordinates
-            of the direction and the inverse range.
+    The results are the (n,) whitened residuals, and the (n, 3) derivatives of the
+    modeled values with respect to two coordinates of the direction and the inverse
+    range. The last residual is that of the prior of the range.
     """
     for k in range(_STEPS + 1):
-        delays, along_u, along_w = _wave_front(u, w, shape.p_AM, c)
+        front = wave_front(shape.p_AM, c, u, w)
         basis = np.linalg.svd(u[np.newaxis])[2][1:].T
         slopes = np.vstack(
             (
-                np.column_stack((root @ along_u @ basis, root @ along_w)),
+                np.column_stack((root @ front.by_h @ basis, root @ front.by_w)),
                 [0.0] * basis.shape[1] + [1.0 / _INVERSE_RANGE],
             )
         )
-        residual = np.append(root @ (tau - delays), -w / _INVERSE_RANGE)
+        residual = np.append(root @ (tau - front.delays), -w / _INVERSE_RANGE)
         if k == _STEPS:
             break
         step = np.linalg.lstsq(slopes, residual, rcond=1e-9)[0]
@@ -211,31 +182,3 @@ def _fit(
         u /= np.linalg.norm(u)
         w = min(max(w + float(step[-1]), 0.0), 1.0 / NEAREST_M)
     return residual, slopes
-
-
-def _wave_front(
-    u: NDArray[np.float64], w: float, p: NDArray[np.float64], c: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Computes the delays of a wave front from the position u / w.
-
-    A microphone at p is nearer to the source than the origin by (2 p.u - w p^2) /
-    (1 + s). Here s is the distance of the microphone from the source times w.
-
-    Returns:
-        delays: (n - 1,) delays of channels 1 ... n - 1 after channel 0, s.
-        along_u: (n - 1, d) derivatives of the delays with respect to u, s.
-        along_w: (n - 1,) derivatives of the delays with respect to w, m s.
-    """
-    square = np.sum(p**2, axis=1)
-    s = np.sqrt(np.maximum(1.0 - 2.0 * w * (p @ u) + w * w * square, 1e-12))
-    path = (w * square - 2.0 * (p @ u)) / (1.0 + s)
-    along_u = -p / s[:, np.newaxis]
-    if w < 1e-6:
-        along_w = 0.5 * (square - (p @ u) ** 2)
-    else:
-        along_w = ((w * square - p @ u) / s - path) / w
-    return (
-        (path[1:] - path[0]) / c,
-        (along_u[1:] - along_u[0]) / c,
-        (along_w[1:] - along_w[0]) / c,
-    )

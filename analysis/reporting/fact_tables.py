@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analysis.reporting.section import Cell, Table, number
+from analysis.reporting.section import Table, number
 
 #: Endings of names, and the units that they mean; longest endings first.
 _UNITS = {
@@ -86,14 +86,3 @@ def _cell(value: Any) -> Any:
             item if isinstance(item, str) else number(item) for item in value
         )
     return _LEFT_OUT
-
-
-def row_table(rows: Sequence[Mapping[str, Any]], *, caption: str = "") -> Table:
-    """Makes a table with one row for each mapping; there is at least one.
-
-    The names of the first row are the headings of the columns. The table omits values
-    that do not fit into a cell.
-    """
-    keys = [k for k, value in rows[0].items() if _cell(value) is not _LEFT_OUT]
-    body: list[list[Cell]] = [[_cell(row.get(key)) for key in keys] for row in rows]
-    return Table([readable_name(key) for key in keys], body, caption)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -205,3 +205,12 @@ Content = (
     | Picture
     | Section
 )
+
+
+def figures_of(section: Section) -> Iterator[Figure]:
+    """Yields the figures of a section and of the sections inside it."""
+    for content in section.contents:
+        if isinstance(content, Figure):
+            yield content
+        elif isinstance(content, Section):
+            yield from figures_of(content)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from analysis.reporting.plain_values import plain
@@ -15,16 +14,10 @@ from diagrams.running.stop_rules import SUCCESSFUL
 from systems.search.search_ending import fault_names
 
 
-def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
-    """Returns the summary of a run as a JSON document.
+def run_document(result: RunResult) -> dict[str, Any]:
+    """Returns the summary of a run as a JSON document, from plain values.
 
-    Args:
-        result: Result of the run.
-        out: Directory of the run, which the summary names. With None, the summary names
-            no directory.
-
-    Returns:
-        Dictionary of plain values, which can be written as JSON.
+    The key ``out`` is None until the files of the run have a directory.
     """
     document = {
         "schema_version": SCHEMA_VERSION,
@@ -41,7 +34,7 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
             "real_time_factor": result.simulated_s / result.wall_s,
         },
         "versions": versions(),
-        "out": str(out) if out is not None else None,
+        "out": None,
     }
     if result.several:
         document["robots"] = {
@@ -67,12 +60,12 @@ def _outcome(result: RunResult) -> dict[str, Any]:
     return ended
 
 
-def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
+def run_text(result: RunResult, summary: dict[str, Any]) -> str:
     """Returns the summary of a run as text that fits on one screen.
 
     Args:
         result: Result of the run.
-        summary: Summary of the run, from ``run_summary``.
+        summary: Summary of the run, from ``run_document``.
 
     Returns:
         Lines of text. The last line has no line end.
@@ -88,7 +81,7 @@ def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
 
     Args:
         result: Result of the run.
-        summary: Summary of the run, from ``run_summary``.
+        summary: Summary of the run, from ``run_document``.
 
     Returns:
         Text of each row, by name of the row. With several robots, the names of a

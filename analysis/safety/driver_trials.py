@@ -59,10 +59,7 @@ class Row(NamedTuple):
     swing_omega: float = 0.0
     """Amplitude of the yaw rate, rad/s."""
     rate: float = 0.0
-    """Angular frequency of the swing, rad/s.
-
-    ``make_trial`` converts the frequency to rad per control period.
-    """
+    """Angular frequency, rad/s. ``make_trial`` converts it to rad per tick."""
     phase: float = 0.0
     """Phase by which the yaw rate leads the forward speed, rad."""
     edge: float = 1.0
@@ -78,16 +75,11 @@ _NEXT: list[NDArray[np.float64]] = [np.array(Row(0.0))]
 
 @register_jitable
 def wave(angle: float, edge: float, skew: float) -> float:
-    """Computes a periodic function between -1 and 1: a sine, square wave or sawtooth.
+    """Computes a periodic function between -1 and 1 of a phase angle in rad.
 
-    Args:
-        angle: Phase angle, rad.
-        edge: Gain before the value is limited to [-1, 1]. A gain of 1 keeps the sine,
-            and a large gain makes a square wave.
-        skew: 0 keeps the sine. Values near 1 or -1 make a sawtooth.
-
-    Returns:
-        The value at this angle.
+    With an ``edge`` of 1 and a ``skew`` of 0, the function is a sine. ``edge`` is the
+    gain before the value is limited to [-1, 1]. A large gain makes a square wave. A
+    ``skew`` near 1 or -1 makes a sawtooth.
     """
     value = edge * math.sin(angle + skew * math.sin(angle))
     return min(max(value, -1.0), 1.0)
@@ -329,11 +321,8 @@ _LAWS = ("active", "conventional")
 def outside(boxes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
     """Moves boxes outward until no box overlaps a circle of 1 m about the start.
 
-    Args:
-        boxes: (x, y, theta, length, width) of each box, m and rad.
-
-    Returns:
-        The moved boxes. Each box is outside the circle by 0.1 mm or more.
+    A box is (x, y, theta, length, width), m and rad. Each moved box is outside the
+    circle by 0.1 mm or more.
     """
     moved = []
     for x, y, *rest in boxes:
@@ -367,18 +356,9 @@ def make_trial(
 ) -> Trial:
     """Makes a trial from boxes and commands.
 
-    Args:
-        names: Names of layout, driver and setting.
-        boxes: (x, y, theta, length, width) of each box, m and rad.
-        rows: Rows of the driver's table, as fields of ``Row``. If empty, the driver is
-            a law.
-        heading: Heading of the robot at the start, rad.
-        source: Position of the source, m.
-        seed: Seed of the noise.
-        duration_s: Duration of the run, s.
-
-    Returns:
-        The trial.
+    ``names`` are those of layout, driver and setting. A box is (x, y, theta, length,
+    width), m and rad. ``rows`` have the fields of ``Row``. Without rows, the law with
+    the driver's name drives. The heading at the start is in rad.
     """
     layout, driver, variant = names
     boxes = outside(boxes)
@@ -427,18 +407,10 @@ def draw_trial(
     setting: str | None = None,
     duration_s: float = DURATION_S,
 ) -> Trial:
-    """Draws a random trial.
+    """Draws a random trial. The same arguments give the same trial.
 
-    Args:
-        seed: Seed of all trials.
-        number: Number of the trial.
-        drivers: Names of ``DRIVERS``, or of laws, from which one is drawn.
-        setting: Name of the robot's setting in ``SETTINGS``. None: the number of the
-            trial selects one of ``VARIANTS``.
-        duration_s: Duration of the run, s.
-
-    Returns:
-        The trial. The same arguments give the same trial.
+    The driver is one of ``drivers``, which are names of ``DRIVERS`` or of laws. Without
+    a ``setting``, the number of the trial selects one of ``VARIANTS``.
     """
     draw = np.random.default_rng([seed, number])
     layout = str(draw.choice([*LAYOUTS]))
@@ -457,118 +429,25 @@ def draw_trial(
     return make_trial(names, boxes, rows, heading, source, noise, duration_s)
 
 
-def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
-    """Draws a random trial with obstacles that cross near the robot's start.
-
-    Args:
-        seed: Seed of all trials.
-        number: Number of the trial.
-        bodies: Number of moving obstacles, at most six.
-        speed: Speed of the moving obstacles, m/s.
-
-    Returns:
-        The trial. The same arguments give the same trial.
-    """
-    draw = np.random.default_rng([seed, number])
-    angle = draw.uniform(-math.pi, math.pi, bodies)
-    far, goals = draw.uniform(1.5, 3.0, bodies), draw.normal(0.0, 0.7, (bodies, 2))
-    boxes = [
-        _box(r * math.cos(a), r * math.sin(a), 0.0, 0.3, 0.3)
-        for r, a in zip(far, angle, strict=True)
-    ]
-    driver = str(draw.choice([*DRIVERS]))
-    names = "crossing", driver, "ring of 12"
-    rows = DRIVERS[driver](draw, boxes, DURATION_S)
-    heading = draw.uniform(-math.pi, math.pi)
-    trial = make_trial(names, boxes, rows, heading, (8.0, 0.0), number)
-    # The other bodies are far away.
-    moving = trial.fields["obstacles"][:bodies]
-    for body, goal in zip(moving, goals, strict=True):
-        begin = np.array(body["waypoints_m"][0])
-        end = begin + 3.5 * (goal - begin) / math.dist(goal, begin)
-        body["waypoints_m"] = [tuple(begin.tolist()), tuple(end.tolist())]
-        body["speed_m_s"] = speed
-    return trial
-
-
-def drive_at_a_wall(speed: float, body_speed: float) -> tuple[RunResult, float]:
-    """Simulates a robot that drives at a wall straight ahead.
-
-    Args:
-        speed: Commanded speed, m/s.
-        body_speed: Largest obstacle speed that the robot's guard allows for, m/s.
-
-    Returns:
-        The run, and the x coordinate of the wall's face, m.
-    """
-    names, rows = ("wall", "straight", "no noise"), [[1e3, TWIST, speed, 0.0, 0, 0]]
-    wall_m = 2.9
-    boxes = [_box(wall_m + 0.05, 0.0, 0.0, 0.1, 3.0)]
-    trial = make_trial(names, boxes, rows, 0.0, (8.0, 0.0), 1)
-    changes = {"guard": {"obstacle_speed_m_s": body_speed}, "duration_s": 20.0}
-    return run_result(trial, changes), wall_m
-
-
-def contact_speeds(trial: Trial, changes: dict[str, Any]) -> tuple[float, float] | None:
-    """Measures how fast a robot moves when it touches something.
-
-    Both speeds are the larger of the values at the last two control periods.
-
-    Args:
-        trial: Trial to run.
-        changes: Fields of the scenario, as for ``run_trial``.
-
-    Returns:
-        Speed of the axle, m/s, and yaw rate, rad/s. None without a contact.
-    """
-    result = run_result(trial, changes)
-    if result.collision is None:
-        return None
-    columns = {name: values[-2:] for name, values in result.columns.items()}
-    speeds = np.hypot(columns["v_WB_x"], columns["v_WB_y"])
-    return float(speeds.max()), float(np.abs(columns["omega_WB"]).max())
-
-
 def run_trial(trial: Trial, changes: dict[str, Any] | None = None) -> Outcome:
-    """Runs a trial, and returns its outcome.
-
-    Args:
-        trial: Trial to run.
-        changes: Fields of the scenario that replace those of the trial.
-
-    Returns:
-        Whether the robot collided, and the least clearances.
-    """
+    """Runs a trial, with changes as for ``run_result``, and returns its outcome."""
     result = run_result(trial, changes)
     return Outcome(result.collision is not None, *least_clearances(result))
 
 
 def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult:
-    """Runs a trial, and returns the complete run.
-
-    Args:
-        trial: Trial to run.
-        changes: Fields of the scenario that replace those of the trial.
-
-    Returns:
-        The run.
-    """
+    """Runs a trial after ``changes`` of the fields of its scenario."""
     _NEXT[0] = trial.table
     fields = _merged(trial.fields, changes or {})
     return simulate(Scenario.model_validate(fields), engine="compiled")
 
 
 def least_clearances(result: RunResult) -> tuple[float, float]:
-    """Computes the least distance of a robot from obstacles at rest.
+    """Computes the least distances of a robot's body and disc from obstacles, m.
 
+    The obstacles are at rest. The disc is centered on the axle and encloses the body.
     The true poses are evaluated at the control periods and halfway between them. A
     negative distance means an overlap.
-
-    Args:
-        result: A run.
-
-    Returns:
-        Distance of the body, and distance of the disc that encloses the body, m.
     """
     robot = result.scenario.only.robot
     others = result.surroundings.bodies.values()

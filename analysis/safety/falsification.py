@@ -3,7 +3,7 @@
 Runs last 10 s and use the compiled engine. Random trials draw layouts and drivers of
 ``driver_trials``. The search is SciPy's differential evolution over the positions of
 posts and the commands. The search minimizes the clearance of the disc that encloses the
-body.
+body. The results are formatted as JSON documents and as text.
 """
 
 from __future__ import annotations
@@ -12,20 +12,24 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.safety.driver_trials import (
     USUAL,
+    Outcome,
+    Row,
     Trial,
     draw_trial,
     make_trial,
     run_trial,
 )
 from analysis.safety.job_pool import run_jobs
+from systems.framework.signals import TICK_S
 from systems.safety.parameters import START_BUBBLE_M
 
 # Number of trials per job. A multiple of this has the same setting of the robot.
@@ -35,6 +39,8 @@ _CHUNKS_A_WORKER = 200
 # The search: number of posts, number of commands, and members of a generation per
 # searched number.
 _POSTS, _COMMANDS, _MEMBERS = 3, 4, 4
+
+_KINDS = ("layout", "driver", "setting")
 
 
 class Found(NamedTuple):
@@ -54,16 +60,7 @@ class Found(NamedTuple):
 def by_chance(
     seed: int, numbers: Iterable[int], drivers: Sequence[str] = USUAL
 ) -> list[Found]:
-    """Runs random trials.
-
-    Args:
-        seed: Seed of all trials.
-        numbers: Numbers of the trials to run.
-        drivers: Names of drivers, as for ``draw_trial``.
-
-    Returns:
-        One result per trial.
-    """
+    """Runs the random trials with the given numbers."""
     found = []
     for number in numbers:
         trial = draw_trial(seed, number, drivers)
@@ -75,13 +72,8 @@ def by_chance(
 def searched_trial(x: NDArray[np.float64]) -> Trial:
     """Converts a point of the search space to a trial.
 
-    Args:
-        x: Numbers in this order: the heading, rad; for each post, direction, rad, and
-            distance, m; for each command, duration, s, forward speed, m/s, and yaw
-            rate, rad/s.
-
-    Returns:
-        The trial.
+    The point has the heading, rad; for each post, direction, rad, and distance, m; for
+    each command, duration, s, forward speed, m/s, and yaw rate, rad/s.
     """
     posts = np.reshape(x[1 : 1 + 2 * _POSTS], (_POSTS, 2)).tolist()
     boxes = [(r * math.cos(a), r * math.sin(a), 0.0, 0.02, 0.02) for a, r in posts]
@@ -96,14 +88,8 @@ def searched_trial(x: NDArray[np.float64]) -> Trial:
 def by_search(runs: int, seed: int) -> list[Found]:
     """Searches by differential evolution for a run in which the robot nearly collides.
 
-    The search minimizes the clearance of the disc that encloses the robot's body.
-
-    Args:
-        runs: Approximate number of runs.
-        seed: Seed of the search.
-
-    Returns:
-        One result per run.
+    The search takes about ``runs`` runs. It minimizes the clearance of the disc that
+    encloses the robot's body.
     """
     bounds = [(-math.pi, math.pi)]
     bounds += [(-math.pi, math.pi), (START_BUBBLE_M + 0.012, 2.5)] * _POSTS
@@ -117,24 +103,29 @@ def by_search(runs: int, seed: int) -> list[Found]:
         # If no body was near, the clearance is infinite.
         return min(found[-1].disc_m, 10.0)
 
+    evolve(clearance, bounds, runs, seed)
+    return found
+
+
+def evolve(
+    function: Callable[[NDArray[np.float64]], float],
+    bounds: Sequence[tuple[float, float]],
+    runs: int,
+    seed: int,
+) -> Any:
+    """Minimizes a function by differential evolution, with about ``runs`` calls."""
     generations = max(1, runs // (_MEMBERS * len(bounds)) - 1)
-    differential_evolution(
-        clearance, bounds, maxiter=generations, popsize=_MEMBERS, rng=seed,
+    return differential_evolution(
+        function, bounds, maxiter=generations, popsize=_MEMBERS, rng=seed,
         polish=False, tol=0.0,
     )  # fmt: skip
-    return found
 
 
 def largest_rate(collisions: int, runs: int) -> float:
     """Computes the upper end of the 95 % interval of a collision rate.
 
-    Args:
-        collisions: Number of collisions.
-        runs: Number of runs.
-
-    Returns:
-        The rate. Without collisions, about three divided by ``runs``. With collisions,
-        the upper end of Wilson's interval.
+    Without collisions, the rate is about three divided by ``runs``. With collisions, it
+    is the upper end of Wilson's interval.
     """
     if collisions == 0:
         return 1.0 - 0.05 ** (1.0 / runs)
@@ -154,16 +145,8 @@ def falsify(
 ) -> list[Found]:
     """Runs random trials, followed by one search per worker process.
 
-    Args:
-        runs: Number of random trials.
-        search: Approximate total number of runs of the searches.
-        seed: Seed of all random numbers.
-        workers: Number of processes.
-        drivers: Names of drivers, as for ``draw_trial``.
-        progress: Called with the number of finished runs.
-
-    Returns:
-        One result per run.
+    The searches together take about ``search`` runs. ``progress`` is called with the
+    number of finished runs.
     """
     edges = [*range(0, runs, _CHUNK), runs]
     jobs = [partial(by_chance, seed, range(a, b), drivers) for a, b in pairwise(edges)]
@@ -176,3 +159,98 @@ def falsify(
         if progress is not None:
             progress(len(found))
     return found
+
+
+def falsification_summary(found: Sequence[Found], seed: int) -> dict[str, Any]:
+    """Builds the JSON document of short runs. Clearances are in m."""
+    groups = {
+        kind: {
+            name: _counts([each for each in found if each.kinds[place] == name])
+            for name in sorted({each.kinds[place] for each in found})
+        }
+        for place, kind in enumerate(_KINDS)
+    }
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "versions": versions(),
+        "seed": seed,
+        **_counts(found),
+        "groups": groups,
+        "nearest": {
+            "body": min(found, key=lambda each: each.clearance_m)._asdict(),
+            "disc": min(found, key=lambda each: each.disc_m)._asdict(),
+        },
+        "collided": [each._asdict() for each in found if each.collided],
+    }
+
+
+def _counts(found: Sequence[Found]) -> dict[str, Any]:
+    hits = sum(each.collided for each in found)
+    return {
+        "runs": len(found),
+        "collisions": hits,
+        "largest_rate": largest_rate(hits, len(found)),
+        "clearance_m": min(each.clearance_m for each in found),
+        "disc_m": min(each.disc_m for each in found),
+    }
+
+
+def falsification_text(summary: dict[str, Any]) -> str:
+    """Formats the document of short runs for a terminal."""
+    lines = []
+    for kind, groups in summary["groups"].items():
+        lines.append(f"by {kind}:")
+        lines += [_line(name, counts) for name, counts in groups.items()]
+    lines.append(_line("all", summary))
+    for what, each in summary["nearest"].items():
+        lines.append(f"least clearance of the {what}: {_run_text(each)}")
+    lines += [f"collision: {_run_text(each)}" for each in summary["collided"]]
+    return "\n".join(lines)
+
+
+def _line(name: str, counts: dict[str, Any]) -> str:
+    return (
+        f"{name:<24} {counts['runs']:>7} runs, {counts['collisions']} collisions "
+        f"(below {100.0 * counts['largest_rate']:.2g} %), least {_clearances(counts)}"
+    )
+
+
+def _run_text(run: dict[str, Any]) -> str:
+    return f"run {run['number']} ({', '.join(run['kinds'])}), {_clearances(run)}"
+
+
+def _clearances(run: dict[str, Any]) -> str:
+    body_mm, disc_mm = 1e3 * run["clearance_m"], 1e3 * run["disc_m"]
+    return f"clearance of the body {body_mm:.1f} mm, of the disc {disc_mm:.1f} mm"
+
+
+def trial_summary(trial: Trial, outcome: Outcome, seed: int) -> dict[str, Any]:
+    """Builds the JSON document of one trial. Commands have the fields of ``Row``."""
+    tick_s = trial.fields.get("tick_s", TICK_S)
+    rows = [Row(*row) for row in trial.table.reshape(-1, len(Row._fields)).tolist()]
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "versions": versions(),
+        "seed": seed,
+        "layout": trial.layout,
+        "driver": trial.driver,
+        "setting": trial.variant,
+        "fields": trial.fields,
+        "commands": [
+            row._replace(end_s=row.end_s * tick_s, rate=row.rate / tick_s)._asdict()
+            for row in rows
+        ],
+        **outcome._asdict(),
+    }
+
+
+def trial_text(summary: dict[str, Any]) -> str:
+    """Formats the document of one trial for a terminal."""
+    rows = [
+        "  " + ", ".join(f"{name} {value:g}" for name, value in row.items())
+        for row in summary["commands"]
+    ]
+    kinds = ", ".join(summary[kind] for kind in _KINDS)
+    hit = "collision" if summary["collided"] else "no collision"
+    end = f"{hit}, {_clearances(summary)}"
+    return "\n".join([kinds, f"fields {summary['fields']}", "commands:", *rows, end])

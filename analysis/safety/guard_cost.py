@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import load_scenario, simulate
 from diagrams.running.simulation import prepared_loop
 
@@ -60,3 +62,22 @@ def _tick_times(name: str, preset: str) -> NDArray[np.float64]:
             spent.append(perf_counter() - start)
         times.append(spent)
     return np.min(times, axis=0)
+
+
+def cost_summary(costs: Sequence[TickCost]) -> dict[str, Any]:
+    """Builds the JSON document of computing times per control period."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "versions": versions(),
+        "costs": [each._asdict() for each in costs],
+    }
+
+
+def cost_text(costs: Sequence[TickCost]) -> str:
+    """Formats computing times for a terminal, one line each."""
+    lines = []
+    for what, mean, p99, worst in costs:
+        rest = "" if p99 is None else f", 99 % below {p99:.1f} ms, worst {worst:.1f} ms"
+        time = f"{1e3 * mean:.0f} us" if p99 is None else f"{mean:.2f} ms"
+        lines.append(f"{what}: {time} per tick{rest}")
+    return "\n".join(lines)

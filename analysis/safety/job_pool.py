@@ -9,6 +9,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from typing import TypeVar
 
 Result = TypeVar("Result")
@@ -17,24 +18,22 @@ Result = TypeVar("Result")
 def run_jobs(
     jobs: Sequence[Callable[[], Result]], workers: int, *, jobs_a_worker: int
 ) -> Iterator[Result]:
-    """Runs jobs in worker processes.
+    """Runs picklable jobs in worker processes. Yields the results in order.
 
-    Args:
-        jobs: Functions without arguments that can be pickled.
-        workers: Number of processes.
-        jobs_a_worker: Number of jobs after which a process is replaced.
-
-    Yields:
-        Results of the jobs, in the order of the jobs.
+    A process is replaced after ``jobs_a_worker`` jobs on average.
     """
-    with ProcessPoolExecutor(
-        workers, max_tasks_per_child=jobs_a_worker, initializer=_end_at_interrupt
-    ) as pool:
-        try:
-            for each in [pool.submit(job) for job in jobs]:
-                yield each.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    # The executor's own option max_tasks_per_child can hang in Python 3.11 and in later
+    # versions without this fix: https://github.com/python/cpython/issues/115634
+    size = workers * jobs_a_worker
+    for start in range(0, len(jobs), size):
+        with ProcessPoolExecutor(
+            workers, mp_context=get_context("spawn"), initializer=_end_at_interrupt
+        ) as pool:
+            try:
+                for each in [pool.submit(job) for job in jobs[start : start + size]]:
+                    yield each.result()
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _end_at_interrupt() -> None:

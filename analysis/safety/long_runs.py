@@ -7,7 +7,8 @@ A run lasts from minutes to an hour. ``jobs`` lists the drivers and settings.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from analysis.reporting.markdown import markdown_table
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.safety.driver_trials import (
     DRIVERS,
     LAYOUTS,
@@ -78,15 +80,10 @@ Job = partial[list[LongRun]]
 class Journal:
     """Saves the runs of each job in a file as soon as the job is done.
 
-    The file has one JSON object per line. Each object holds the seed, the number of the
-    job, and the runs of the job.
-
-    Args:
-        path: Path of the file. The file need not exist.
-        seed: Seed of the jobs. The journal ignores jobs with other seeds in the file.
-
-    Raises:
-        InputError: A line of the file does not describe a job.
+    The file need not exist. It has one JSON object per line. Each object holds the
+    seed, the number of the job, and the runs of the job. The journal ignores jobs with
+    other seeds in the file. Raises ``InputError`` if a line of the file does not
+    describe a job.
     """
 
     def __init__(self, path: Path, seed: int) -> None:
@@ -111,14 +108,16 @@ class Journal:
 
 def _keep(path: Path, seed: int, number: int, job: Job) -> list[LongRun]:
     runs = job()
-    kept = [
-        {**run._asdict(), "swing": run.swing and run.swing._asdict()} for run in runs
-    ]
+    kept = [_fields(run) for run in runs]
     # Several processes share the file. A single write in append mode is safe.
     line = json.dumps({"seed": seed, "job": number, "runs": kept})
     with path.open("a", encoding="utf-8") as file:
         file.write(f"{line}\n")
     return runs
+
+
+def _fields(run: LongRun) -> dict[str, Any]:
+    return {**run._asdict(), "swing": run.swing and run.swing._asdict()}
 
 
 def _run_of(kept: dict[str, Any]) -> LongRun:
@@ -127,42 +126,21 @@ def _run_of(kept: dict[str, Any]) -> LongRun:
 
 
 def long_run(trial: Trial, swing: Swing | None = None) -> LongRun:
-    """Runs a trial, and summarizes the result.
-
-    Args:
-        trial: Trial to run.
-        swing: Swing of the driver, which is recorded in the result.
-
-    Returns:
-        The result.
-    """
+    """Runs a trial, and records the driver's swing in the result."""
     return _judged(trial.driver, trial.variant, swing, run_result(trial))
 
 
 def _judged(
     driver: str, setting: str, swing: Swing | None, result: RunResult
 ) -> LongRun:
-    contact_s = result.simulated_s if result.collision else np.inf
-    return LongRun(
-        driver,
-        setting,
-        result.simulated_s,
-        contact_s,
-        *least_clearances(result),
-        float(odometry_error(result).max()),
-        swing,
-    )
+    end_s, clearances = result.simulated_s, least_clearances(result)
+    contact_s = end_s if result.collision else np.inf
+    drift_m = float(odometry_error(result).max())
+    return LongRun(driver, setting, end_s, contact_s, *clearances, drift_m, swing)
 
 
 def jobs(seed: int) -> list[Job]:
-    """Lists the jobs whose runs make up the table.
-
-    Args:
-        seed: Seed of all random numbers and searches.
-
-    Returns:
-        The jobs, longest first. Each job is a function without arguments.
-    """
+    """Lists the jobs whose runs make up the table, longest first."""
     found: list[Job] = []
     slow_first = sorted(SETTINGS, key="cells of 2 cm".__ne__)
     found += [partial(_by_search_for_contact, each, seed) for each in _SEARCHED]
@@ -224,14 +202,9 @@ def _drawn_commands(setting: str, seed: int) -> list[LongRun]:
 
 
 def summary_table(runs: Sequence[LongRun], by: Sequence[str]) -> str:
-    """Summarizes runs in a Markdown table.
+    """Summarizes runs in a Markdown table, grouped by the fields ``by`` of ``LongRun``.
 
-    Args:
-        runs: Results of the runs.
-        by: Fields of ``LongRun`` by which the runs are grouped, such as ``driver``.
-
-    Returns:
-        A table with one row per group, and a last row for all runs.
+    The last row is for all runs.
     """
     groups: dict[tuple[str, ...], list[LongRun]] = {}
     for run in runs:
@@ -258,3 +231,35 @@ def _summed(runs: Sequence[LongRun]) -> list[str]:
         f"{1e3 * min(run.disc_m for run in runs):.1f}",
         f"{1e3 * max(run.odometry_m for run in runs):.1f}",
     ]
+
+
+def long_summary(found: Mapping[int, Sequence[LongRun]], seed: int) -> dict[str, Any]:
+    """Builds the JSON document of long runs, given by number of their job."""
+
+    def told(job: int, run: LongRun) -> dict[str, Any]:
+        contact_s = run.contact_s if math.isfinite(run.contact_s) else None
+        return {"job": job, **_fields(run), "contact_s": contact_s}
+
+    runs = [told(job, run) for job, own in found.items() for run in own]
+    contacts = sum(run["contact_s"] is not None for run in runs)
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "versions": versions(),
+        "seed": seed,
+        "contacts": contacts,
+        "runs": runs,
+    }
+
+
+def long_text(found: Mapping[int, Sequence[LongRun]]) -> str:
+    """Formats tables by driver and setting, and one line per contact."""
+    runs = [run for own in found.values() for run in own]
+    by = (("driver", "setting"), ("driver",), ("setting",))
+    tables = [f"{summary_table(runs, names)}\n" for names in by]
+    contacts = [
+        f"contact in job {job}: {run}"
+        for job, own in found.items()
+        for run in own
+        if math.isfinite(run.contact_s)
+    ]
+    return "\n".join([*tables, *contacts]).rstrip()

@@ -20,7 +20,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import differential_evolution
 
 from analysis.safety.driver_trials import (
     AHEAD,
@@ -33,6 +32,7 @@ from analysis.safety.driver_trials import (
     outside,
     run_result,
 )
+from analysis.safety.falsification import evolve
 from diagrams import RunResult
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
@@ -42,6 +42,8 @@ SLOWEST_HZ, FASTEST_HZ = 0.1, 10.0
 #: Duration of a run in the search for drift, and in the search for a contact, s. The
 #: second is enough to visit four boxes, to swing, and to press against all four.
 _DRIFT_S, _CONTACT_S = 48.0, 450.0
+#: Position of the source, m. The drivers ignore it.
+_SOURCE = 80.0, 0.0
 #: Bearing of the body's front left corner from the axle, rad.
 _CORNER = math.atan2(0.5 * RobotParameters().width_m, 0.5 * RobotParameters().length_m)
 
@@ -114,25 +116,13 @@ def swing_at_boxes(
     swings: int = 4,
     swing_s: float = 10.0,
     presses: int = 1,
-    seed: int = 1,
 ) -> Trial:
     """Makes a driver that visits boxes, swings, and presses against the boxes again.
 
-    To swing means to oscillate in forward speed and yaw rate.
-
-    Args:
-        names: Names of layout, driver and setting.
-        boxes: (x, y, theta, length, width) of each box, m and rad.
-        swing: Swing of the driver. After each swing, the driver returns to the start.
-        duration_s: Duration of the run, s.
-        heading: Heading at the start and at the beginning of each swing, rad.
-        swings: Number of swings between visits to boxes.
-        swing_s: Duration of each swing, s.
-        presses: Number of boxes that the driver visits between swings.
-        seed: Seed of the noise.
-
-    Returns:
-        The trial.
+    ``names`` are those of layout, driver and setting. A box is (x, y, theta, length,
+    width), m and rad. Between visits to ``presses`` boxes, the driver swings ``swings``
+    times, for ``swing_s`` each. It faces ``heading`` in rad at the start and at the
+    beginning of each swing. After each swing, it returns to the start.
     """
     boxes, script, turn, home_s = outside(boxes), _Script(), 0, 4.0 + 0.03 * swing_s
     faces = [_nearest_point(box) for box in boxes]
@@ -148,8 +138,7 @@ def swing_at_boxes(
             script.press(*faces[turn % len(faces)])
             script.home(heading, home_s)
             turn += 1
-    source = 80.0, 0.0
-    return make_trial(names, boxes, script.rows, heading, source, seed, duration_s)
+    return make_trial(names, boxes, script.rows, heading, _SOURCE, 1, duration_s)
 
 
 def _nearest_point(box: Sequence[float]) -> tuple[float, float]:
@@ -164,16 +153,9 @@ def _nearest_point(box: Sequence[float]) -> tuple[float, float]:
 def swing_once(setting: str) -> Trial:
     """Makes a driver that visits a box, swings once, and visits the box again.
 
-    To swing means to oscillate in forward speed and yaw rate. The swing lasts 150 s.
-    With grid cells of 2 cm, the swing lasts 80 s. With a control period of 50 ms, the
-    swing lasts 40 s. If the odometry approximates the arc of each control period by its
-    chord, the robot touches the box.
-
-    Args:
-        setting: Name of the robot's setting in ``SETTINGS``.
-
-    Returns:
-        The trial.
+    The swing lasts 150 s. With grid cells of 2 cm, it lasts 80 s. With a control period
+    of 50 ms, it lasts 40 s. If the odometry approximates the arc of each control period
+    by its chord, the robot touches the box.
     """
     names, box = ("box", "swing, by hand, once", setting), (0.0, -2.63, 0.0, 0.3, 0.3)
     swing_s = {"cells of 2 cm": 80.0, "tick of 50 ms": 40.0}.get(setting, 150.0)
@@ -182,21 +164,11 @@ def swing_once(setting: str) -> Trial:
 
 
 def swing_alone(swing: Swing, setting: str, duration_s: float) -> Trial:
-    """Makes a driver that turns around once and then swings on an empty floor.
-
-    Args:
-        swing: Swing of the driver.
-        setting: Name of the robot's setting in ``SETTINGS``.
-        duration_s: Duration of the run, s.
-
-    Returns:
-        The trial.
-    """
+    """Makes a driver that turns around once and then swings on an empty floor."""
     names, script = ("empty", "swing", setting), _Script()
     script.look_around()
     script.add(duration_s, swing.until(0.0))
-    source = 80.0, 0.0
-    return make_trial(names, [], script.rows, 0.0, source, 1, duration_s)
+    return make_trial(names, [], script.rows, 0.0, _SOURCE, 1, duration_s)
 
 
 #: Bounds of the parameters of a swing, in this order: forward speed, m/s; logarithm of
@@ -245,15 +217,8 @@ def odometry_error(result: RunResult) -> NDArray[np.float64]:
 def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
     """Searches by differential evolution for the swing with the largest odometry drift.
 
-    A swing is an oscillation in forward speed and yaw rate.
-
-    Args:
-        setting: Name of the robot's setting in ``SETTINGS``.
-        runs: Approximate number of runs, of 48 s each.
-        seed: Seed of the search.
-
-    Returns:
-        The swing, and the drift of the odometry, m/s.
+    The search takes about ``runs`` runs of 48 s each. Returns the swing and its drift,
+    m/s.
     """
 
     def drift(x: NDArray[np.float64]) -> float:
@@ -261,35 +226,18 @@ def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
         result = run_result(swing_alone(swing, setting, _DRIFT_S))
         return -float(odometry_error(result)[-1]) / result.simulated_s
 
-    best = _evolve(drift, len(_BOUNDS), runs, seed)
+    best = evolve(drift, [(0.0, 1.0)] * len(_BOUNDS), runs, seed)
     return _repeated(_swing_at(best.x), setting), -float(best.fun)
 
 
 def four_boxes(distance_m: float) -> list[tuple[float, ...]]:
     """Places boxes on all four sides of the start, for drift in any direction.
 
-    Args:
-        distance_m: Distance of the box centers from the start, m.
-
-    Returns:
-        (x, y, theta, length, width) of each box, m and rad.
+    Each box is (x, y, theta, length, width), m and rad. ``distance_m`` is the distance
+    of the box centers from the start.
     """
     sides = (0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0)
     return [(distance_m * x, distance_m * y, 0.0, 0.3, 0.3) for x, y in sides]
-
-
-def _searched_trial(x: NDArray[np.float64], setting: str) -> Trial:
-    """Converts a point of the unit cube to a trial.
-
-    The coordinates of the point determine the swing, the heading and the distance of
-    the boxes.
-    """
-    heading, far = math.tau * x[-2], 1.5 + 0.5 * x[-1]
-    names = "four boxes", "swing, searched for contact", setting
-    return swing_at_boxes(
-        names, four_boxes(far), _swing_at(x[:-2]), _CONTACT_S, heading=heading,
-        swings=6, swing_s=40.0, presses=4,
-    )  # fmt: skip
 
 
 def search_contact(
@@ -300,31 +248,19 @@ def search_contact(
 ) -> None:
     """Searches by differential evolution for a run that ends in a contact.
 
-    The search varies the heading, the distance of four boxes, and the swing. A swing is
-    an oscillation in forward speed and yaw rate.
-
-    Args:
-        setting: Name of the robot's setting in ``SETTINGS``.
-        runs: Approximate number of runs, of 450 s each.
-        seed: Seed of the search.
-        judge: Function of the swing and the result of a run. The search minimizes the
-            value that the function returns.
+    The search takes about ``runs`` runs of 450 s each. It varies the heading, the
+    distance of four boxes, and the swing. It minimizes the value that ``judge`` returns
+    for the swing and the result of a run.
     """
+    names = "four boxes", "swing, searched for contact", setting
 
     def worth(x: NDArray[np.float64]) -> float:
-        trial = _searched_trial(x, setting)
+        swing, heading, far = _swing_at(x[:-2]), math.tau * x[-2], 1.5 + 0.5 * x[-1]
+        trial = swing_at_boxes(
+            names, four_boxes(far), swing, _CONTACT_S, heading=heading, swings=6,
+            swing_s=40.0, presses=4,
+        )  # fmt: skip
         # If the robot never came near a body, the clearance is infinite.
-        return min(judge(_swing_at(x[:-2]), run_result(trial)), 10.0)
+        return min(judge(swing, run_result(trial)), 10.0)
 
-    _evolve(worth, len(_BOUNDS) + 2, runs, seed)
-
-
-def _evolve(
-    function: Callable[[NDArray[np.float64]], float], numbers: int, runs: int, seed: int
-) -> Any:
-    members = 4
-    generations = max(1, runs // (members * numbers) - 1)
-    return differential_evolution(
-        function, [(0.0, 1.0)] * numbers, maxiter=generations, popsize=members,
-        rng=seed, polish=False, tol=0.0,
-    )  # fmt: skip
+    evolve(worth, [(0.0, 1.0)] * (len(_BOUNDS) + 2), runs, seed)

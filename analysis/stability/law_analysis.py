@@ -31,7 +31,7 @@ class Study:
     scenario: Scenario
     """The scenario with the law to analyze."""
     full: bool = False
-    """Whether the parts may take minutes."""
+    """Whether checks by simulation take longer."""
     found: dict[str, Any] = field(default_factory=dict)
     """Data objects of earlier parts, by key. A part without a result has no entry."""
 
@@ -69,8 +69,6 @@ class Part(Generic[Data]):
     """Returns notes that readers must know before they use the numbers."""
     fresh: bool = False
     """Whether the section begins on a new page of paper."""
-    slow: bool = False
-    """Whether the part takes minutes. Only a full report has such parts."""
 
     def section(self, data: Data) -> Section:
         """Returns the section of the report about a data object."""
@@ -148,7 +146,7 @@ def analyse_law(
     """Runs the parts of the stability analysis for the law of a scenario, in order.
 
     The sensors may be exact or realistic, because each part chooses its own sensors.
-    ``full`` allows parts that take minutes. ``step`` is called with the title of each
+    ``full`` is explained in ``Study``. ``step`` is called with the title of each
     part before the part runs. If a part has no result, its section states the reason.
     All parts depend on the first part; therefore every exception of the first part is
     raised.

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
+from matplotlib.figure import Figure as Drawing
 
 from analysis.models.model_export import write_models
 from analysis.reporting.criterion import Verdict, compare_verdicts, shown_value
@@ -28,6 +29,7 @@ from analysis.reporting.section import (
     Note,
     Section,
     Table,
+    figures_of,
     number,
 )
 from analysis.stability.law_analysis import LawAnalysis
@@ -37,15 +39,13 @@ from systems.laws.catalogue import law_title
 from systems.laws.law import Equation
 
 
-def stability_document(
-    analyses: Sequence[LawAnalysis], out: Path | None
-) -> dict[str, Any]:
+def stability_document(analyses: Sequence[LawAnalysis]) -> dict[str, Any]:
     """Returns the JSON document of a stability analysis of one or several laws.
 
     The document of one law has its results as keys at the top level. The document of
     several laws has the key ``laws`` with one document per law, and the key
-    ``comparison`` with the verdicts side by side. ``out`` is the result directory,
-    whose name is written into the document, or None if no files are written.
+    ``comparison`` with the verdicts side by side. The key ``out`` is None until the
+    files of the report have a directory.
     """
     first = analyses[0].scenario
     common = {
@@ -53,7 +53,7 @@ def stability_document(
         "scenario": first.name,
         "seed": first.seed,
     }
-    ending = {"versions": versions(), "out": str(out) if out is not None else None}
+    ending = {"versions": versions(), "out": None}
     laws = [_law_document(analysis) for analysis in analyses]
     if len(laws) == 1:
         return {**common, **laws[0], **ending}
@@ -82,6 +82,17 @@ def stability_text(analyses: Sequence[LawAnalysis]) -> str:
         before = f"{each.law}: " if len(analyses) > 1 else ""
         lines += [f"note: {before}{note}" for note in each.notes]
     return "\n".join(lines)
+
+
+def report_figures(analyses: Sequence[LawAnalysis]) -> dict[str, Drawing]:
+    """Draws all figures of a report, by caption."""
+    drawn = {}
+    for each in analyses:
+        before = f"{each.law}: " if len(analyses) > 1 else ""
+        for section in each.sections:
+            for figure in figures_of(section):
+                drawn[before + figure.caption] = figure.draw()
+    return drawn
 
 
 def write_stability(

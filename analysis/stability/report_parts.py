@@ -6,21 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from analysis.reporting.section import Bullets
+from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.law_analysis import Part
 from analysis.stability.linear_parts import LINEAR_MODELS, OPERATING_POINTS, STEP
 from analysis.stability.margin_parts import HEADING_LOOP, MARGINS, RECOMMENDED_GAINS
-from analysis.stability.nonlinear_parts import (
-    CERTIFIED_STARTS,
-    CONTACT_OSCILLATION,
-    DISTURBANCE_BOUNDS,
-    ENERGY_BALANCE,
-    GAP_MAPS,
-    OFFSET_MAPS,
-    PHASE_PORTRAIT,
-    RATIO_MAP,
-    SOS_REGION,
-    VELOCITY_TERMS,
-)
 from analysis.stability.robustness_parts import CONTACT_ROBUSTNESS, ROBUSTNESS
 from analysis.stability.route_parts import (
     ADAPTATION,
@@ -33,8 +22,6 @@ from analysis.stability.sampling_parts import (
     BURST_CYCLE,
     CONTACT_MODE,
     DELAY_MARGINS,
-    ROOT_LOCI,
-    SAMPLING,
 )
 from diagrams import Scenario
 
@@ -47,21 +34,11 @@ SOUND_PARTS: tuple[Part[Any], ...] = (
     MARGINS,
     DELAY_MARGINS,
     BURST_CYCLE,
-    ROOT_LOCI,
-    SAMPLING,
     CONTACT_MODE,
-    VELOCITY_TERMS,
-    CONTACT_OSCILLATION,
     CERTIFIED_STARTS,
     ENERGY_BALANCE,
     ROBUSTNESS,
     CONTACT_ROBUSTNESS,
-    GAP_MAPS,
-    OFFSET_MAPS,
-    RATIO_MAP,
-    PHASE_PORTRAIT,
-    SOS_REGION,
-    DISTURBANCE_BOUNDS,
     RECOMMENDED_GAINS,
 )
 #: Parts for a robot on a route.
@@ -84,21 +61,19 @@ _NOT_FOR_SEARCHES = (
 )
 
 
-def parts_for(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part[Any], ...]:
+def parts_for(scenarios: Sequence[Scenario]) -> tuple[Part[Any], ...]:
     """Returns the parts of a stability report that suit the robot of the scenarios.
 
-    There is one scenario per law, and all have the same robot. A full report also has
-    the parts that take minutes.
+    There is one scenario per law, and all have the same robot.
     """
     robot = scenarios[0].only
-    sound = tuple(part for part in SOUND_PARTS if full or not part.slow)
     if robot.searches is not None:
-        return (*SEARCH_PARTS, _left_out(_NOT_FOR_SEARCHES, sound))
+        return (*SEARCH_PARTS, _left_out(_NOT_FOR_SEARCHES, SOUND_PARTS))
     guarded = any(each.only.own_guard is not None for each in scenarios)
     guard = (GUARD,) if guarded else ()
     if robot.kind == "router":
-        return (*ROUTE_PARTS, _left_out(_NOT_FOR_ROUTES, sound), *guard)
-    return (*sound, *guard)
+        return (*ROUTE_PARTS, _left_out(_NOT_FOR_ROUTES, SOUND_PARTS), *guard)
+    return (*SOUND_PARTS, *guard)
 
 
 def _left_out(reason: str, parts: Sequence[Part[Any]]) -> Part[list[str]]:

@@ -1,11 +1,10 @@
-"""Parts of the stability report: delay, bursts, sample period, and contact."""
+"""Parts of the stability report: delay, bursts, and contact."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,33 +19,15 @@ from analysis.linear.burst_cycle import (
     burst_cycle,
     simulate_burst_cycle,
 )
-from analysis.linear.burst_gaps import GapChart, gap_chart
 from analysis.linear.contact_mode import ContactLimits, contact_limits, contact_model
 from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
 from analysis.linear.delayed_run import DelayCheck, check_delay_margin
-from analysis.linear.root_locus import RootLocus, root_loci
-from analysis.linear.sampled_stability import (
-    ConditionCheck,
-    PolesAgainstPeriod,
-    StabilityChart,
-    check_conditions,
-    gain_chart,
-    gain_delay_chart,
-    poles_against_period,
-)
+from analysis.linear.linear_plots import plot_contact_limits, plot_delay_check
 from analysis.models.open_loops import DIRECTIONS
 from analysis.models.operating_points import OperatingPoint
 from analysis.reporting.criterion import Criterion, Reading
 from analysis.reporting.plain_values import pick
 from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
-from analysis.stability.chart_plots import (
-    plot_chart,
-    plot_contact_limits,
-    plot_delay_check,
-    plot_gap_chart,
-    plot_poles_against_period,
-    plot_root_loci,
-)
 from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
 
@@ -86,8 +67,6 @@ class BurstCycles:
     cycles: tuple[BurstCycle, ...]
     runs: tuple[BurstRun, ...]
     """One simulated run per entry of ``cycles``, in the same order."""
-    gaps: GapChart
-    """Largest multipliers over the duration of the silence."""
 
 
 def _sampled(study: Study) -> SampledLoop:
@@ -186,8 +165,7 @@ def _bursts(study: Study) -> BurstCycles:
     at: OperatingPoint = study.need("equilibria").at
     cycles = tuple(burst_cycle(study.scenario, hold, point=at) for hold in HOLDS)
     runs = tuple(simulate_burst_cycle(cycle, _CYCLES[study.full]) for cycle in cycles)
-    gaps = gap_chart(study.scenario, point=at)
-    return BurstCycles(study.scenario.follower.tracker.hold, cycles, runs, gaps)
+    return BurstCycles(study.scenario.follower.tracker.hold, cycles, runs)
 
 
 def _burst_document(data: BurstCycles) -> dict[str, Any]:
@@ -201,7 +179,6 @@ def _burst_document(data: BurstCycles) -> dict[str, Any]:
             }
             for cycle, run in zip(data.cycles, data.runs, strict=True)
         ],
-        "gaps": data.gaps,
     }
 
 
@@ -234,10 +211,6 @@ def _show_bursts(data: BurstCycles) -> list[Content]:
             "the motion along this line only."
         ),
         Table(["hold", "multipliers", "simulated, along", "stable"], rows),
-        Figure(
-            lambda: plot_gap_chart(data.gaps),
-            "Growth over the silence between bursts, for each way to hold the target.",
-        ),
     ]
 
 
@@ -257,103 +230,6 @@ BURST_CYCLE = Part[BurstCycles](
     ),
     document=_burst_document,
 )  # fmt: skip
-
-
-def _show_loci(data: Sequence[RootLocus]) -> list[Content]:
-    return [
-        (
-            "The figures show the poles ln(z)/T of the sampled loop as one gain "
-            "varies, for the loop to the target and for the contact mode where the law "
-            "is stiffest."
-        ),
-        Table.of(
-            data,
-            {
-                "gain": lambda locus: f"`{locus.parameter}`",
-                "loop": "loop",
-                "current": "today",
-                "stability ends at": "limit",
-            },
-        ),
-        Figure(
-            lambda: plot_root_loci(data),
-            "Root loci with marks at the current poles.",
-            scale=True,
-        ),
-    ]
-
-
-ROOT_LOCI = Part[Sequence[RootLocus]](
-    "root_loci", "Root loci", lambda study: root_loci(study.scenario), _show_loci
-)
-
-
-@dataclass(frozen=True)
-class SamplingCharts:
-    """Stability over sample period, gains, and delay, with the scenario marked."""
-
-    conditions: tuple[ConditionCheck, ...]
-    """Closed-form stability conditions of the sampled double integrator."""
-    period: PolesAgainstPeriod
-    charts: tuple[StabilityChart, ...]
-
-
-def _sampling(study: Study) -> SamplingCharts:
-    scenario = study.scenario
-    return SamplingCharts(
-        check_conditions(seed=scenario.seed, tick_s=scenario.tick_s),
-        poles_against_period(scenario),
-        (gain_chart(scenario), gain_delay_chart(scenario)),
-    )
-
-
-def _sampling_document(data: SamplingCharts) -> dict[str, Any]:
-    return {
-        "conditions": data.conditions,
-        "longest_stable_period_s": data.period.longest_stable_s,
-        "charts": [
-            {**vars(chart), "stable_share": chart.stable_share} for chart in data.charts
-        ],
-    }
-
-
-def _show_sampling(data: SamplingCharts) -> list[Content]:
-    return [
-        Table.of(
-            data.conditions,
-            {
-                "scheme": "scheme",
-                "stable exactly for": "condition",
-                "pairs tried": "pairs",
-                "stable": "stable",
-                "mismatches": "mismatches",
-            },
-            "Sampled double integrator: closed form against eigenvalues",
-        ),
-        (
-            "The loop to the target stays stable up to a sample period of "
-            f"{data.period.longest_stable_s:.3g} s; the current period is "
-            f"{data.period.today_s:g} s."
-        ),
-        Figure(
-            lambda: plot_poles_against_period(data.period),
-            "Poles over the sample period.",
-            scale=True,
-        ),
-        *(
-            Figure(partial(plot_chart, chart), f"Growth: {chart.title}.", scale=True)
-            for chart in data.charts
-        ),
-    ]
-
-
-SAMPLING = Part[SamplingCharts](
-    "sampling",
-    "Sample period, gains and delay",
-    _sampling,
-    _show_sampling,
-    document=_sampling_document,
-)
 
 
 @dataclass(frozen=True)

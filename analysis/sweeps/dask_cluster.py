@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import logging
 import socket
+from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from itertools import islice
-from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
 from urllib.parse import urlsplit
@@ -21,7 +21,13 @@ from uuid import uuid4
 
 from analysis.reporting.provenance import versions
 from analysis.sweeps.one_run import Outcome, Task, lost_outcome
-from analysis.sweeps.processes import ATTEMPTS, PULSE_S, WorkerError, WorkerProcess
+from analysis.sweeps.processes import (
+    PULSE_S,
+    WorkerError,
+    WorkerProcess,
+    close_workers,
+    run_locally,
+)
 from systems.framework.input_error import InputError
 
 #: Number of tasks per thread of the cluster: one task runs, and one waits.
@@ -34,7 +40,7 @@ _CONNECT_S = 10.0
 
 _LOGGER = logging.getLogger("phonotaxis")
 
-_idle: SimpleQueue[WorkerProcess] = SimpleQueue()
+_idle: deque[WorkerProcess] = deque()
 
 
 def connect(scheduler: str) -> Any:
@@ -217,28 +223,10 @@ def _outcome(future: Any, task: Task) -> Outcome:
 
 def _run_remotely(task: Task) -> Outcome:
     """Runs a task, in a thread of a Dask worker."""
-    for _ in range(ATTEMPTS):
-        try:
-            worker = _idle.get_nowait()
-        except Empty:
-            worker = WorkerProcess(task)
-        try:
-            outcome = worker.run(task)
-        except EOFError:
-            worker.close()
-            continue
-        except BaseException:
-            worker.close()
-            raise
-        _idle.put(worker)
-        return outcome
-    return lost_outcome(task, f"its worker process ended {ATTEMPTS} times")
+    (outcome,) = run_locally(iter([task]), lambda: None, workers=1, idle=_idle)
+    return outcome
 
 
 def _dismiss_idle() -> None:
     """Ends the idle worker processes of a Dask worker; runs in this worker."""
-    while True:
-        try:
-            _idle.get_nowait().close()
-        except Empty:
-            return
+    close_workers(_idle)

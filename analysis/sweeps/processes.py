@@ -90,15 +90,6 @@ class WorkerProcess:
         outcome: Outcome = message
         return outcome
 
-    def run(self, task: Task) -> Outcome:
-        """Runs one task to its end; raises the same errors as ``receive``."""
-        if not self.ready:
-            self.receive()
-        self.give(task)
-        outcome = self.receive()
-        assert outcome is not None
-        return outcome
-
     def close(self) -> None:
         """Ends the process and its child at once."""
         self.connection.close()
@@ -108,7 +99,11 @@ class WorkerProcess:
 
 
 def run_locally(
-    tasks: Iterator[Task], pulse: Callable[[], None], *, workers: int
+    tasks: Iterator[Task],
+    pulse: Callable[[], None],
+    *,
+    workers: int,
+    idle: deque[WorkerProcess] | None = None,
 ) -> Generator[Outcome]:
     """Runs the tasks of a parameter sweep in local processes.
 
@@ -120,6 +115,8 @@ def run_locally(
         pulse: Function that is called a few times per second. If it raises an
             exception, the work ends.
         workers: Number of processes.
+        idle: Processes that are used first. The function returns its processes to this
+            queue, which several threads may share. None means that the processes end.
 
     Yields:
         Results of the runs, in the order in which the runs end.
@@ -127,7 +124,7 @@ def run_locally(
     Raises:
         WorkerError: A worker process cannot be started.
     """
-    pool = _Pool(tasks)
+    pool = _Pool(tasks, deque() if idle is None else idle)
     try:
         for _ in range(workers):
             pool.start()
@@ -135,12 +132,22 @@ def run_locally(
             yield from pool.step()
             pulse()
     finally:
-        pool.close()
+        close_workers(deque(pool.busy.values()))
+        if idle is None:
+            close_workers(pool.idle)
+
+
+def close_workers(workers: deque[WorkerProcess]) -> None:
+    """Ends the processes in a queue, and empties the queue."""
+    with contextlib.suppress(IndexError):
+        while True:
+            workers.pop().close()
 
 
 class _Pool:
-    def __init__(self, tasks: Iterator[Task]) -> None:
+    def __init__(self, tasks: Iterator[Task], idle: deque[WorkerProcess]) -> None:
         self.busy: dict[Connection, WorkerProcess] = {}
+        self.idle = idle
         self._tasks = tasks
         self._first: deque[Task] = deque()
         self._again: dict[int, int] = {}
@@ -149,12 +156,16 @@ class _Pool:
         return self._first.popleft() if self._first else next(self._tasks, None)
 
     def start(self) -> None:
-        """Starts a worker for the next task, if there is one."""
+        """Takes or starts a worker for the next task, if there is one."""
         task = self._next()
-        if task is not None:
-            self._first.appendleft(task)
+        if task is None:
+            return
+        try:
+            worker = self.idle.pop()
+        except IndexError:
             worker = WorkerProcess(task)
-            self.busy[worker.connection] = worker
+        worker.give(task)
+        self.busy[worker.connection] = worker
 
     def step(self) -> Iterator[Outcome]:
         for connection in wait(list(self.busy), PULSE_S):
@@ -167,7 +178,7 @@ class _Pool:
             while len(worker.tasks) < AHEAD and (task := self._next()) is not None:
                 worker.give(task)
             if not worker.tasks:
-                self._dismiss(worker)
+                self.idle.append(self.busy.pop(worker.connection))
             if outcome is not None:
                 yield outcome
 
@@ -179,7 +190,7 @@ class _Pool:
         worker.
         """
         task, *others = worker.tasks
-        self._dismiss(worker)
+        self.busy.pop(worker.connection).close()
         self._first.extendleft(reversed(others))
         tried = self._again.pop(task.point.index, 1)
         if tried < ATTEMPTS:
@@ -188,11 +199,3 @@ class _Pool:
         else:
             yield lost_outcome(task, f"its worker process ended {ATTEMPTS} times")
         self.start()
-
-    def _dismiss(self, worker: WorkerProcess) -> None:
-        del self.busy[worker.connection]
-        worker.close()
-
-    def close(self) -> None:
-        for worker in list(self.busy.values()):
-            self._dismiss(worker)

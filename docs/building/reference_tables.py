@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from analysis.commands.command_line import make_parser
 from analysis.reporting.markdown import markdown_table
 from analysis.runs.columns import COLUMNS
 from analysis.runs.metric_table import GROUPS
 from diagrams.scenario.fields.field_list import list_fields
 from diagrams.scenario.fields.shipped import scenario_schema
+from phonotaxis.commands.command_line import make_parser
 
 #: Symbol in the equations and place in the papers, by field.
 _SOURCES = Path(__file__).with_name("parameter_sources.json")

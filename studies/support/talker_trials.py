@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import oaconvolve
 
-from analysis.hearing.synthetic_speech import speech_like
+from studies.support.synthetic_speech import speech_like
 from systems.framework.input_error import InputError
 
 ROOM_M = (6.0, 5.0, 2.8)

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from analysis.laws.head_on import head_on
-from analysis.nonlinear.equilibrium_maps import BOX_M, BOX_X_M, TO_GO_M, boxes_scenario
 from diagrams import Scenario
+from studies.nonlinear.equilibrium_maps import BOX_M, BOX_X_M, TO_GO_M, boxes_scenario
+from studies.nonlinear.head_on import head_on
 from systems.framework.input_error import InputError
 from systems.laws.impedance_controller import attraction_force, repulsion_force
 from systems.ranging.collision_vector import collision_vectors, echo_points

@@ -93,7 +93,7 @@ class Law:
     ``RadialLawController`` computes the force.
     """
     loop_gains: tuple[str, str] | None = None
-    """Names of the gains of the distance term and the velocity term, for root loci."""
+    """Names of the gains of the distance term and the velocity term."""
     tuning: Tuning | None = None
     """How the design chooses the gains. None: there are no gains to choose."""
     robot: RobotKind = "follower"

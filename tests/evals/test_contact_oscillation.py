@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.laws.head_on import head_on
 from analysis.linear.contact_mode import contact_model
-from analysis.nonlinear.contact_oscillation import contact_oscillation
-from analysis.nonlinear.harmonic_balance import predict_oscillation
 from diagrams import load_scenario
+from studies.nonlinear.contact_oscillation import contact_oscillation
+from studies.nonlinear.harmonic_balance import predict_oscillation
+from studies.nonlinear.head_on import head_on
 
 GAINS = (
     "attraction.stiffness_n_m=2.0",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.runs.guarded_motion import halts_of
-from analysis.runs.run_report import run_summary, summary_text
+from analysis.runs.run_report import run_document, run_text
 from diagrams import load_scenario, simulate
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.safety.braking import HALTED
@@ -48,9 +48,9 @@ def test_it_stops_and_says_why(law, setting, fault, sensor):
     assert moved < 1e-3
     assert (run.columns["guard_action"][late] == HALTED).all()
     assert run.cause == "stuck"
-    summary = run_summary(run, None)
+    summary = run_document(run)
     assert summary["halts"][0]["fault"] == fault
-    assert str(halt) in summary_text(run, summary)
+    assert str(halt) in run_text(run, summary)
 
 
 @pytest.mark.parametrize("kind", ["frozen", "noisy"])

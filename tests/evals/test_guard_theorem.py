@@ -14,14 +14,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.safety.driver_trials import (
-    contact_speeds,
-    draw_crossing,
-    draw_trial,
-    make_trial,
-    run_trial,
-)
+from analysis.safety.driver_trials import draw_trial, make_trial, run_trial
 from diagrams import Scenario, load_scenario, simulate
+from studies.support.crossing_trials import contact_speeds, draw_crossing
 from systems.base.diff_drive_plant import DiffDrivePlant, body_twist
 from systems.base.lagged_motion import advance_pose, lagged_motion
 from systems.base.parameters import PlantParameters

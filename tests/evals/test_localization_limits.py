@@ -7,16 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.hearing.free_field import (
-    FreeFieldCell,
-    Loudspeaker,
-    frame_estimator,
-    run_cell,
-    total_consistency,
-)
 from analysis.hearing.localization import prepare_localization
-from analysis.hearing.localization_report import localization_summary, localization_text
+from analysis.hearing.localization_report import (
+    localization_document,
+    localization_text,
+)
 from analysis.hearing.paper_tables import PAPER_CELLS
+from analysis.hearing.single_frames import Loudspeaker, frame_estimator
+from studies.support.free_field_trials import FreeFieldCell, run_cell, total_consistency
 from systems.base.robot import RobotParameters
 from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
@@ -77,7 +75,7 @@ def test_stated_errors_are_the_actual_ones(trials, method):
 def with_tolerances() -> dict[str, Any]:
     """The experiment as in docs/results_hearing.md, as a JSON document."""
     experiment = prepare_localization(tolerances=True)
-    return localization_summary(experiment, experiment.run(), None)
+    return localization_document(experiment, experiment.run())
 
 
 def test_an_array_built_with_care_beats_the_papers_tables(with_tolerances):

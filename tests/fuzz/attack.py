@@ -22,7 +22,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from analysis.commands.command_line import BAD_INPUT, MOST_FAULTS
+from phonotaxis.commands.command_line import BAD_INPUT, MOST_FAULTS
 from tests.fuzz.attack_cases import KINDS, Case, cases
 
 LONGEST_LINE = 300

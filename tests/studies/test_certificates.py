@@ -8,10 +8,10 @@ import re
 import pytest
 
 from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.diagram_trials import try_diagram
 from analysis.certificates.energy_certificate import certify_energy
 from studies import certificates as table
 from studies.__main__ import main
+from studies.proofs.diagram_trials import try_diagram
 
 
 @pytest.fixture(scope="module")

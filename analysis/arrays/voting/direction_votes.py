@@ -16,15 +16,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from analysis.arrays.voting.phase_plane import PhasePlane
-from analysis.arrays.voting.rank_one_bins import (
+from analysis.arrays.voting.single_waves import (
     GROUP_FRAMES,
+    PhasePlane,
     find_rank_one,
     group_powers,
 )
@@ -46,8 +46,15 @@ _WEAKEST, _FOLLOW = 0.3, 0.1
 #   s.
 _RISE, _DECAY_DB_S = 1.6, 62.5
 
+# Least ratio of the two largest eigenvalues of the covariance in a bin with one wave.
+_LEAST_RATIO = 20.0
+
 # Number of frequencies whose levels are stored.
 _LEVELS = 24
+
+# Highest frequency to use, Hz. Lower frequencies suffice to separate speech and most
+# noises.
+_HIGHEST_HZ = 8_000.0
 
 # Least upper limit of a band whose bins vote, Hz. A lower band contains too little
 # speech.
@@ -81,6 +88,11 @@ class DirectionVotes(NamedTuple):
     group_levels_db: NDArray[np.float64]
     """(g, 24) power of all channels at 24 frequencies of the band, dB relative to the
     unit of the samples."""
+
+    def part(self, votes: Any, groups: slice) -> DirectionVotes:
+        """Returns the votes with some indices, and the levels of some groups."""
+        kept = [each[votes] for each in self[:5]] + [each[groups] for each in self[5:]]
+        return DirectionVotes._make(kept)
 
 
 class VoteMemory(NamedTuple):
@@ -116,9 +128,6 @@ class VotePlan:
     votes."""
     plane: PhasePlane
     steered: SteeredSearch
-    least_ratio: float
-    """Least ratio of the two largest eigenvalues of the covariance in a bin with one
-    wave."""
 
     @classmethod
     def of(
@@ -128,25 +137,13 @@ class VotePlan:
         sample_rate_hz: float,
         *,
         band_hz: tuple[float, float] = (200.0, 8_000.0),
-        least_ratio: float = 20.0,
     ) -> VotePlan:
         """Makes the settings with which an array votes for directions of sound.
 
-        Args:
-            shape: The microphones, which must measure bearings.
-            c: Speed of sound, m/s.
-            sample_rate_hz: Sample rate, Hz.
-            band_hz: Lowest and highest frequency to use, Hz. Single frequencies vote
-                only up to the frequency at which the phases of the shortest pairs wrap.
-            least_ratio: Least ratio of the two largest eigenvalues of the channels'
-                covariance. If the ratio is smaller, the covariance is not that of one
-                wave.
-
-        Returns:
-            The settings.
-
-        Raises:
-            InputError: The array cannot measure bearings, or a number is invalid.
+        No frequency above 8 kHz votes, or above twice the lowest frequency if this is
+        larger. Single frequencies vote only up to the frequency at which the phases of
+        the shortest pairs wrap. Raises an InputError if the array cannot measure
+        bearings, or if a number is invalid.
         """
         if "bearing" not in shape.angles:
             raise InputError(
@@ -154,11 +151,12 @@ class VotePlan:
                 "a row that is not level gives no bearings; give a row in the "
                 "plane z = const, or add microphones off the row",
             )
-        _check(c, sample_rate_hz, band_hz, least_ratio)
+        _check(c, sample_rate_hz, band_hz)
         frame_s = max(_FRAME_S, _CROSSINGS * shape.max_delay(c))
         hop = max(1, round(frame_s * sample_rate_hz / _HOPS))
         size = _HOPS * hop
-        low, high = band_hz[0], min(band_hz[1], 0.5 * sample_rate_hz)
+        low, high = band_hz
+        high = min(high, max(_HIGHEST_HZ, 2.0 * low), 0.5 * sample_rate_hz)
         plane = PhasePlane.of(shape, c)
         top = min(high, plane.highest_hz)
         per_hz = size / sample_rate_hz
@@ -175,7 +173,6 @@ class VotePlan:
             bins=bins,
             plane=plane,
             steered=SteeredSearch.of(shape, c, per_hz, (low, high)),
-            least_ratio=least_ratio,
         )
 
     def blank(self) -> VoteMemory:
@@ -199,23 +196,10 @@ class VotePlan:
 def cast_votes(
     plan: VotePlan, memory: VoteMemory, block: NDArray[np.floating | np.integer]
 ) -> tuple[DirectionVotes, VoteMemory]:
-    """Computes the votes for directions from one more block of samples.
+    """Computes the votes for directions from one more block of (n, k) samples.
 
-    A vote is an estimated direction of the sound in a group of consecutive frames. The
-    lengths of the blocks do not affect the votes, apart from rounding errors.
-
-    Args:
-        plan: Settings of the votes.
-        memory: State after the previous block; ``plan.blank()`` before the first block.
-        block: (n, k) samples of n channels, in any unit, of any length k.
-
-    Returns:
-        votes: The new votes.
-        memory: State after this block.
-
-    Raises:
-        InputError: The block does not have one channel per microphone, or a sample is
-            not finite.
+    The lengths of the blocks do not affect the votes, apart from rounding errors. The
+    samples may have any unit. The first memory is ``plan.blank()``.
     """
     samples = np.concatenate((memory.tail, _checked(plan, block)), axis=1)
     groups = (samples.shape[1] - plan.group_samples) // plan.hop + 1
@@ -246,26 +230,17 @@ def cast_votes(
 
 
 def join_votes(parts: list[DirectionVotes]) -> DirectionVotes:
-    """Joins the votes for directions from several blocks in the order of time.
-
-    Args:
-        parts: Votes of the blocks, as ``cast_votes`` returns them.
-
-    Returns:
-        All votes.
-    """
+    """Joins the votes for directions from several blocks in the order of time."""
     if not parts:
         return _no_votes()
     joined = DirectionVotes._make(
         np.concatenate(each) for each in zip(*parts, strict=True)
     )
     order = np.argsort(joined.t_s, kind="stable")
-    return DirectionVotes._make([*(each[order] for each in joined[:5]), *joined[5:]])
+    return joined.part(order, slice(None))
 
 
-def _check(
-    c: float, sample_rate_hz: float, band_hz: tuple[float, float], least_ratio: float
-) -> None:
+def _check(c: float, sample_rate_hz: float, band_hz: tuple[float, float]) -> None:
     if not _SPEEDS_M_S[0] <= c <= _SPEEDS_M_S[1]:
         raise InputError(
             "c", f"{c:g} m/s is not a speed of sound; use about 343 m/s in air"
@@ -281,8 +256,6 @@ def _check(
             f"{low:g} to {high:g} Hz at {sample_rate_hz:g} samples/s; give a lowest "
             "frequency above 0 and below the highest and half the rate",
         )
-    if not 1.0 <= least_ratio < math.inf:
-        raise InputError("least_ratio", f"{least_ratio:g}; give at least 1")
 
 
 def _checked(
@@ -335,14 +308,10 @@ def _levels_db(powers: NDArray[np.float32]) -> NDArray[np.float64]:
 def _louder(
     powers: NDArray[np.float32], level: float
 ) -> tuple[NDArray[np.bool_], float]:
-    """Finds the bins whose power is above an adaptive limit.
+    """Finds the (g, b) bins whose power is above an adaptive limit.
 
-    A bin is one frequency in one group of frames. The limit adapts from group to group,
-    so that about 30 % of the bins are below it.
-
-    Returns:
-        loud: (g, b) whether each of the b bins of g groups is above the limit.
-        level: Limit after the last group, as power.
+    The limit adapts from group to group, so that about 30 % of the bins are below it.
+    The other result is the limit after the last group.
     """
     loud = np.zeros(powers.shape, dtype=bool)
     for row, kept in zip(powers, loud, strict=True):
@@ -357,13 +326,9 @@ def _louder(
 def _risen(
     powers: NDArray[np.float32], echo: NDArray[np.float32], hop_s: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
-    """Finds the bins that are louder than the echo of earlier sound.
+    """Finds the (g, b) bins that are louder than the echo of earlier sound.
 
-    A bin is one frequency in one group of frames.
-
-    Returns:
-        fresh: (g, b) whether each of the b bins of g groups is louder than the echo.
-        echo: (b,) largest possible echo after the last group, as power.
+    The other result is the (b,) largest possible echo after the last group.
     """
     decay = np.float32(10.0 ** (-0.1 * _DECAY_DB_S * hop_s))
     fresh = np.empty(powers.shape, dtype=bool)
@@ -382,8 +347,8 @@ def _steered_votes(
 ) -> DirectionVotes:
     """Computes votes for the directions at which the steered response is greatest.
 
-    Only every fourth group of frames votes. A group has four frames, so these groups
-    have no frames in common.
+    A group has four frames. Only every fourth group votes, so that these groups have no
+    frames in common.
     """
     found = []
     times = []
@@ -406,7 +371,7 @@ def _bin_votes(
     t_s: NDArray[np.float64],
 ) -> DirectionVotes:
     """Computes the votes of single bins that contain only one wave."""
-    group, bins, pattern = find_rank_one(spectra, loud, plan.least_ratio)
+    group, bins, pattern = find_rank_one(spectra, loud, _LEAST_RATIO)
     frequency = plan.frequencies_hz[bins]
     fits = plan.plane.fit(pattern, frequency)
     return _cast(

@@ -16,7 +16,6 @@ from analysis.arrays.voting.direction_votes import (
     join_votes,
 )
 from analysis.arrays.voting.source_tracks import (
-    Detection,
     SourceTrack,
     TrackMemory,
     TrackParameters,
@@ -72,25 +71,13 @@ class ListenerMemory:
 
     @classmethod
     def blank(cls, plan: VotePlan) -> ListenerMemory:
-        """Makes the state before the first block.
-
-        Args:
-            plan: Settings with which the array votes for directions.
-
-        Returns:
-            The initial state.
-        """
+        """Makes the state before the first block."""
         return cls(plan.blank(), join_votes([]), TrackMemory(), 0, 0)
 
     def after_gap(self, plan: VotePlan, *, keeps_tracks: bool) -> ListenerMemory:
         """Returns the state after missing samples or a change of the channels.
 
-        Args:
-            plan: Settings with which the array votes for directions after the gap.
-            keeps_tracks: Whether the tracks from before the gap continue.
-
-        Returns:
-            The new state. Times continue, and no identity of a track is used again.
+        Times continue, and no identity of a track is used again.
         """
         # The first group of frames after the gap begins at most one hop from its exact
         # time.
@@ -105,24 +92,10 @@ def hear_sources(
     plan: VotePlan,
     parameters: ListenerParameters,
 ) -> tuple[list[TrackedSources], ListenerMemory]:
-    """Tracks sources in one more block of samples.
+    """Tracks sources in one more block of (n, k) samples, in any unit.
 
     The tracks are updated in steps of constant length, 0.1 s by default. A block may
     complete any number of steps.
-
-    Args:
-        block: (n, k) samples of n channels, in any unit, of any length k.
-        memory: State after the previous block.
-        plan: Settings with which the array votes for directions.
-        parameters: Parameters that determine how votes become tracks.
-
-    Returns:
-        found: Sources at the end of each completed step.
-        memory: State after this block.
-
-    Raises:
-        InputError: The block does not have one channel per microphone, or a sample is
-            not finite.
     """
     rate = plan.sample_rate_hz
     found, first = [], 0
@@ -138,8 +111,13 @@ def hear_sources(
         )
         first = last
         if memory.samples == end:
-            sources, memory = _step(memory, rate, parameters)
+            t_s = end / rate
+            recent = _between(memory.recent, t_s - parameters.window_s, math.inf)
+            sources, tracks = _tracked(recent, t_s, memory.tracks, parameters)
             found.append(sources)
+            memory = replace(
+                memory, recent=recent, tracks=tracks, steps=memory.steps + 1
+            )
     return found, memory
 
 
@@ -149,16 +127,9 @@ def follow_sources(
     plan: VotePlan,
     parameters: ListenerParameters,
 ) -> list[TrackedSources]:
-    """Tracks sources in a whole recording, from its votes for directions.
+    """Tracks sources in a whole recording, from its votes in the order of time.
 
-    Args:
-        votes: Votes of the whole recording, in the order of time.
-        seconds: Length of the recording, s.
-        plan: Settings with which the array voted.
-        parameters: Parameters that determine how votes become tracks.
-
-    Returns:
-        Sources at the end of each step, as ``hear_sources`` returns them.
+    The result is that of ``hear_sources``.
     """
     memory, found = TrackMemory(), []
     # The time of a vote is the middle of its samples. In live sound, the vote exists
@@ -167,43 +138,27 @@ def follow_sources(
     for k in range(1, math.floor(seconds / parameters.step_s + 1e-9) + 1):
         t_s = k * parameters.step_s
         recent = _between(votes, t_s - parameters.window_s, t_s - late)
-        told, memory = step_tracks(
-            _detections(recent, parameters), t_s, memory, parameters.tracks
-        )
-        found.append(TrackedSources(t_s, tuple(told)))
+        sources, memory = _tracked(recent, t_s, memory, parameters)
+        found.append(sources)
     return found
 
 
-def _step(
-    memory: ListenerMemory, rate: float, parameters: ListenerParameters
-) -> tuple[TrackedSources, ListenerMemory]:
-    t_s = memory.samples / rate
-    recent = _between(memory.recent, t_s - parameters.window_s, math.inf)
-    told, tracks = step_tracks(
-        _detections(recent, parameters), t_s, memory.tracks, parameters.tracks
-    )
-    after = replace(memory, recent=recent, tracks=tracks, steps=memory.steps + 1)
-    return TrackedSources(t_s, tuple(told)), after
-
-
-def _detections(
-    recent: DirectionVotes, parameters: ListenerParameters
-) -> list[Detection]:
+def _tracked(
+    votes: DirectionVotes,
+    t_s: float,
+    memory: TrackMemory,
+    parameters: ListenerParameters,
+) -> tuple[TrackedSources, TrackMemory]:
     least = max(_LEAST_VOTES, _VOTES_S * parameters.window_s)
-    return [
-        Detection(
-            source.bearing,
-            _OVERLAP * source.bearing_std,
-            source.elevation,
-            source.share,
-        )
-        for source in gather_sources(recent, least_votes=least)
+    detections = [
+        source._replace(bearing_std=_OVERLAP * source.bearing_std)
+        for source in gather_sources(votes, least_votes=least)
     ]
+    told, memory = step_tracks(detections, t_s, memory, parameters.tracks)
+    return TrackedSources(t_s, tuple(told)), memory
 
 
 def _between(votes: DirectionVotes, begin: float, end: float) -> DirectionVotes:
     inside = slice(*np.searchsorted(votes.t_s, (begin, end)))
     groups = slice(*np.searchsorted(votes.group_t_s, (begin, end)))
-    return DirectionVotes._make(
-        [*(each[inside] for each in votes[:5]), *(each[groups] for each in votes[5:])]
-    )
+    return votes.part(inside, groups)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from pydrake.common.value import Value
 
-from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.direction_votes import VotePlan
 from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
@@ -69,11 +69,11 @@ class SourceListener(Block):
     ) -> None:
         super().__init__()
         self._parameters = parameters
-        self._plan = vote_plan(
+        self._plan = VotePlan.of(
             ArrayShape.of(microphones_B(robot)),
             sound_speed_m_s,
             microphones.sample_rate_hz,
-            band_hz,
+            band_hz=band_hz,
         )
         self.set_name("source_listener")
         self.declare_ports()
@@ -82,9 +82,7 @@ class SourceListener(Block):
         ticket = self.abstract_state_ticket(state)
         self.declare_output("sources", self._publish_sources, {ticket})
         self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=microphones.frame_s,
-            offset_sec=0.0,
-            update=self._hear,
+            period_sec=microphones.frame_s, offset_sec=0.0, update=self._hear
         )
 
     def _hear(self, context: Any, state: Any) -> None:

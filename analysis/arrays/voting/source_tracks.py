@@ -19,13 +19,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.optimize import linear_sum_assignment
 
+from analysis.arrays.voting.vote_peaks import VotedSource, wrapped
 from systems.framework.parameters import Fraction, Parameters, Positive
 
 # Largest distance of a detection from its track, in standard deviations.
@@ -71,19 +71,6 @@ class TrackParameters(Parameters):
     hidden_s: Positive = 3.0
     """Time without a detection of its own after which a track ends, s. It limits how
     long a nearby track may hide a track."""
-
-
-class Detection(NamedTuple):
-    """A direction from which sound came in a step."""
-
-    bearing: float
-    """Bearing, rad."""
-    bearing_std: float
-    """Standard deviation of the bearing, rad."""
-    elevation: float | None
-    """Elevation, rad. None if the array cannot measure it."""
-    share: float = 1.0
-    """Share of all sound in the step, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -139,26 +126,15 @@ class TrackMemory:
 
 
 def step_tracks(
-    detections: Sequence[Detection],
+    detections: Sequence[VotedSource],
     t_s: float,
     memory: TrackMemory,
     parameters: TrackParameters,
 ) -> tuple[list[SourceTrack], TrackMemory]:
-    """Updates the tracks with the detections of one step.
+    """Updates the tracks with the detections of one step, and returns those to report.
 
-    Args:
-        detections: Detections of this step, in any order.
-        t_s: Time of this step, s. Steps may have different lengths.
-        memory: Tracks after the previous step; ``TrackMemory()`` before the first step.
-        parameters: Parameters of the motion and the detection of sources.
-
-    Returns:
-        told: The tracks to report. The oldest track is first. A track gets its identity
-            when it is first reported.
-        memory: All tracks after this step.
-
-    Raises:
-        ValueError: The time is before the time of the previous step.
+    Steps may have different lengths. The first memory is ``TrackMemory()``. A track
+    gets its identity when it is first reported. The oldest track is first.
     """
     elapsed = 0.0 if memory.t_s is None else t_s - memory.t_s
     if elapsed < 0.0:
@@ -195,7 +171,6 @@ def step_tracks(
 
 
 def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack:
-    """Predicts a track by the time dt."""
     forget = math.exp(-dt / p.rate_memory_s)
     F = np.array([[1.0, dt], [0.0, forget]])
     q = math.radians(p.acceleration_std_deg_s2) ** 2
@@ -209,7 +184,7 @@ def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack
     silent = track.silent * (1.0 - to_sounding) + track.sounding * to_silent
     return replace(
         track,
-        bearing=_wrapped(track.bearing + dt * track.rate),
+        bearing=wrapped(track.bearing + dt * track.rate),
         rate=forget * track.rate,
         covariance=F @ track.covariance @ F.T + Q,
         sounding=stays * sounding,
@@ -218,9 +193,7 @@ def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack
 
 
 def _assigned(
-    tracks: Sequence[SourceTrack],
-    detections: Sequence[Detection],
-    p: TrackParameters,
+    tracks: Sequence[SourceTrack], detections: Sequence[VotedSource], p: TrackParameters
 ) -> list[int | None]:
     """Returns the number of the detection of each track, or None."""
     chosen: list[int | None] = [None] * len(tracks)
@@ -230,7 +203,7 @@ def _assigned(
     for i, track in enumerate(tracks):
         for k, d in enumerate(detections):
             variance = float(track.covariance[0, 0]) + _scatter(track, d, p)
-            off = _wrapped(d.bearing - track.bearing)
+            off = wrapped(d.bearing - track.bearing)
             # Reported tracks have priority, so that a new track does not take their
             # detections.
             late = 0.0 if track.identity else 4.0
@@ -246,15 +219,11 @@ def _assigned(
 
 def _hidden(
     tracks: Sequence[SourceTrack],
-    detections: Sequence[Detection],
+    detections: Sequence[VotedSource],
     chosen: list[int | None],
     p: TrackParameters,
 ) -> dict[int, int]:
-    """Finds tracks without a detection that another nearby track may hide.
-
-    Returns:
-        For the number of each hidden track, the number of the track that hides it.
-    """
+    """Returns the tracks that another nearby track may hide, and that other track."""
     resolution = math.radians(p.resolution_deg)
     hidden: dict[int, int] = {}
     for i, track in enumerate(tracks):
@@ -264,31 +233,27 @@ def _hidden(
             k = chosen[j]
             if k is None or not other.identity:
                 continue
-            apart = abs(_wrapped(track.bearing - other.bearing))
-            off = abs(_wrapped(detections[k].bearing - track.bearing))
+            apart = abs(wrapped(track.bearing - other.bearing))
+            off = abs(wrapped(detections[k].bearing - track.bearing))
             if apart < resolution and off < resolution:
                 hidden[i] = j
                 break
     return hidden
 
 
-def _scatter(track: SourceTrack, detection: Detection, p: TrackParameters) -> float:
+def _scatter(track: SourceTrack, detection: VotedSource, p: TrackParameters) -> float:
     """Returns the variance of a detection relative to its track, rad^2."""
     rate_squared = track.rate**2 + float(track.covariance[1, 1])
     return detection.bearing_std**2 + p.smear_s**2 * rate_squared
 
 
 def _heard(
-    track: SourceTrack,
-    detection: Detection,
-    t_s: float,
-    p: TrackParameters,
+    track: SourceTrack, detection: VotedSource, t_s: float, p: TrackParameters
 ) -> SourceTrack:
-    """Updates a track with its detection."""
     of_detection = _scatter(track, detection, p)
     C = track.covariance
     variance = float(C[0, 0]) + of_detection
-    off = _wrapped(detection.bearing - track.bearing)
+    off = wrapped(detection.bearing - track.bearing)
     gain = C[:, 0] / variance
     # Joseph's form of the covariance update keeps the covariance symmetric.
     A = np.eye(2) - np.outer(gain, [1.0, 0.0])
@@ -303,7 +268,7 @@ def _heard(
         elevation = 0.7 * track.elevation + 0.3 * elevation
     return replace(
         track,
-        bearing=_wrapped(track.bearing + float(gain[0]) * off),
+        bearing=wrapped(track.bearing + float(gain[0]) * off),
         rate=track.rate + float(gain[1]) * off,
         covariance=A @ C @ A.T + of_detection * np.outer(gain, gain),
         elevation=track.elevation if elevation is None else elevation,
@@ -321,10 +286,10 @@ def _missed(track: SourceTrack, p: TrackParameters) -> SourceTrack:
     return replace(track, sounding=sounding / whole, silent=track.silent / whole)
 
 
-def _born(detection: Detection, t_s: float) -> SourceTrack:
+def _born(detection: VotedSource, t_s: float) -> SourceTrack:
     return SourceTrack(
         identity=0,
-        bearing=_wrapped(detection.bearing),
+        bearing=wrapped(detection.bearing),
         rate=0.0,
         covariance=np.diag([detection.bearing_std**2, _RATE_STD**2]),
         elevation=detection.elevation,
@@ -363,13 +328,8 @@ def _single(tracks: list[SourceTrack], p: TrackParameters) -> list[SourceTrack]:
     near = math.radians(0.5 * p.resolution_deg)
     for track in sorted(tracks, key=lambda t: (t.identity == 0, t.t_born)):
         again = track.identity == 0 and any(
-            abs(_wrapped(track.bearing - other.bearing)) < near for other in kept
+            abs(wrapped(track.bearing - other.bearing)) < near for other in kept
         )
         if not again:
             kept.append(track)
     return kept
-
-
-def _wrapped(angle: float) -> float:
-    """Returns an angle wrapped to (-pi, pi], rad."""
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)

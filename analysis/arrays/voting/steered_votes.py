@@ -13,10 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
-from analysis.arrays.steered_response import LAG_DENSITY, SearchGrid, steered_response
-from systems.delays.correlations import correlations_at_lags
+from analysis.arrays.steered_response import SearchGrid, steered_response
 from systems.sound.array_shape import ArrayShape
 
 # _LEAST_SHARE: least height of a peak, as a share of the highest peak.
@@ -45,8 +43,6 @@ class SteeredSearch:
     grid: SearchGrid
     bins: slice
     """Bins of the spectra to use."""
-    length: int
-    """Number of samples of a correlation."""
     azimuth: NDArray[np.float64]
     """(g,) azimuth of each position, rad. NaN for positions nearly overhead."""
     elevation: NDArray[np.float64]
@@ -57,22 +53,9 @@ class SteeredSearch:
     def of(
         cls, shape: ArrayShape, c: float, window_s: float, band_hz: tuple[float, float]
     ) -> SteeredSearch:
-        """Makes a search over all positions that the array can distinguish.
-
-        Args:
-            shape: The microphones.
-            c: Speed of sound, m/s.
-            window_s: Length of the frames, s.
-            band_hz: Lowest and highest frequency to use, Hz.
-
-        Returns:
-            The search.
-        """
+        """Makes a search over all positions that the array can distinguish."""
         low, high = band_hz
-        length = int(
-            fft.next_fast_len(math.ceil(LAG_DENSITY * high * window_s), real=True)
-        )
-        grid = SearchGrid.of(shape, c, high, length / window_s)
+        grid = SearchGrid.of(shape, c, high, window_s)
         p = grid.p_AS
         range_m = np.where(grid.inverse_range > 0.0, np.linalg.norm(p, axis=1), 1.0)
         level = np.hypot(p[:, 0], p[:, 1])
@@ -82,27 +65,24 @@ class SteeredSearch:
         if "elevation" in shape.angles:
             elevation = np.arctan2(p[:, 2], level)
         bins = slice(math.ceil(low * window_s), math.floor(high * window_s) + 1)
-        return cls(shape, grid, bins, length, azimuth, elevation)
+        return cls(shape, grid, bins, azimuth, elevation)
 
     def votes(
         self, spectra: NDArray[np.complex64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Finds up to three peaks of the steered response to a group of frames.
 
-        Args:
-            spectra: (f, n, b) spectra of f frames, n channels and all b bins from 0.
-
-        Returns:
-            azimuth: (k,) azimuths of the peaks, rad. Empty if no peak stands out.
-            elevation: (k,) elevations of the peaks, rad.
-            response: (k,) responses of the peaks.
+        The (f, n, b) spectra contain all b bins from 0. The results are the azimuths
+        and elevations of the peaks, rad, and the responses.
         """
         i, j = self.shape.pairs.T
         chosen = spectra[:, :, self.bins]
         cross = np.einsum("fpb,fpb->pb", chosen[:, i].conj(), chosen[:, j])
         size = np.abs(cross)
         cross = np.where(size > 0.0, cross / np.maximum(size, 1e-30), 0.0)
-        response = self._response(cross.astype(np.complex64))
+        share = cross.astype(np.complex64) / cross.shape[1]
+        correlations = self.grid.correlations(share, self.bins)
+        response = steered_response(correlations, self.grid).astype(np.float64)
         response[np.isnan(self.azimuth)] = -1.0
         # Overlapping frames count half, and so do their bins, because neither are
         # independent.
@@ -111,12 +91,6 @@ class SteeredSearch:
         least = max(_DEVIATIONS * noise, _LEAST_RESPONSE)
         peaks = self._peaks(response, least)
         return self.azimuth[peaks], self.elevation[peaks], response[peaks]
-
-    def _response(self, cross: NDArray[np.complex64]) -> NDArray[np.float64]:
-        share = cross / cross.shape[1]
-        gated = correlations_at_lags(share, self.bins, self.length, self.grid.max_lag)
-        gated = gated * np.float32(0.5 * self.length)
-        return steered_response(gated, self.grid).astype(np.float64)
 
     def _peaks(self, response: NDArray[np.float64], least: float) -> NDArray[np.int64]:
         """Returns the positions of the highest peaks whose bearings differ enough."""

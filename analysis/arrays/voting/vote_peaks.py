@@ -11,7 +11,7 @@ densities, but at different directions.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,19 +78,12 @@ class VotedSource(NamedTuple):
 def gather_sources(
     votes: DirectionVotes, *, least_votes: float = _LEAST_VOTES
 ) -> list[VotedSource]:
-    """Finds the sources in a span of time from its votes for directions.
+    """Finds the sources in a span of time. The source with the largest share is first.
 
     If enough single frequencies vote, they decide together with the steered response.
     Otherwise, the steered response decides alone. Two steady sounds at the same time
-    cannot be separated, because no time or frequency contains only one of them.
-
-    Args:
-        votes: Votes of the span of time.
-        least_votes: Least number of votes of single frequencies for a source. Use a
-            smaller number for less than one second of sound.
-
-    Returns:
-        The sources. The source with the largest share of the votes is first.
+    cannot be separated, because no time or frequency contains only one of them. For
+    less than one second of sound, ``least_votes`` must be smaller.
     """
     single = ~votes.steered
     enough = np.count_nonzero(single) >= least_votes
@@ -99,7 +92,7 @@ def gather_sources(
     azimuth, weight = votes.azimuth[use], votes.weight[use]
     if azimuth.size < least:
         return []
-    density, centres = _density(azimuth, weight)
+    density, centers = _density(azimuth, weight)
     if enough and np.count_nonzero(votes.steered) >= _LEAST_STEERED:
         other, _ = _density(votes.azimuth[votes.steered], votes.weight[votes.steered])
         density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
@@ -108,10 +101,10 @@ def gather_sources(
     peaks = _peaks(density)
     if not peaks.size:
         return []
-    nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centres[peaks]), axis=1)]
+    nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centers[peaks]), axis=1)]
     for peak in peaks:
         source = _source(
-            azimuth, votes.elevation[use], weight, centres[peak], nearest == peak
+            azimuth, votes.elevation[use], weight, centers[peak], nearest == peak
         )
         if source is not None and source.votes >= least:
             height = float(density[peak] / density.max())
@@ -125,19 +118,14 @@ def gather_sources(
 def _density(
     azimuth: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Computes the smoothed density of the votes around the circle.
-
-    Returns:
-        density: (c,) density in each of c cells of the circle.
-        bearings: (c,) bearings of the middles of the cells, rad.
-    """
+    """Returns the smoothed density of the votes in cells, and the bearings of these."""
     cells = np.floor((azimuth + math.pi) / (2.0 * math.pi) * _CELLS).astype(int)
     histogram = np.bincount(cells % _CELLS, weight, _CELLS)
-    centres = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
-    kernel = np.exp((np.cos(centres - centres[0]) - 1.0) / _KERNEL_RAD**2)
+    centers = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
+    kernel = np.exp((np.cos(centers - centers[0]) - 1.0) / _KERNEL_RAD**2)
     smooth = np.fft.irfft(np.fft.rfft(histogram) * np.fft.rfft(kernel), _CELLS)
     density = np.maximum(smooth, 0.0) / smooth.sum()
-    return density + _ANYWHERE / _CELLS, centres
+    return density + _ANYWHERE / _CELLS, centers
 
 
 def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -162,33 +150,25 @@ def _source(
 ) -> VotedSource | None:
     """Makes the source at a peak from the votes that are nearest to this peak.
 
-    Args:
-        azimuth: (k,) azimuths of the votes, rad.
-        elevation: (k,) elevations of the votes, rad.
-        weight: (k,) weights of the votes.
-        bearing: Bearing of the peak, rad.
-        nearest: (k,) whether this peak is the nearest one to each vote.
-
-    Returns:
-        The source. None if no vote is near the peak, for example if only the steered
-        response has a peak there.
+    The source is None if no vote is near the peak, for example if only the steered
+    response has a peak there.
     """
-    near = np.abs(_wrapped(azimuth - bearing)) < _NEAR_RAD
+    near = np.abs(wrapped(azimuth - bearing)) < _NEAR_RAD
     count = int(np.count_nonzero(near))
     mine = near & nearest
     if not mine.any():
         return None
     a, w = azimuth[mine], weight[mine]
     for _ in range(_STEPS):
-        off = _wrapped(a - bearing)
+        off = wrapped(a - bearing)
         pull = w * np.exp((np.cos(off) - 1.0) / _KERNEL_RAD**2)
         bearing += math.atan2(float(pull @ np.sin(off)), float(pull @ np.cos(off)))
-    off = _wrapped(a - bearing)
+    off = wrapped(a - bearing)
     spread = math.sqrt(float(w @ off**2) / float(w.sum()))
     std = spread / math.sqrt(min(float(a.size), _INDEPENDENT))
     heights = elevation[mine]
     return VotedSource(
-        bearing=float(_wrapped(np.array(bearing))),
+        bearing=float(wrapped(bearing)),
         bearing_std=math.hypot(std, _LEAST_STD_RAD),
         elevation=float(np.median(heights)) if np.isfinite(heights).all() else None,
         share=float(w.sum() / weight.sum()),
@@ -197,6 +177,6 @@ def _source(
     )
 
 
-def _wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns angles wrapped to (-pi, pi], rad."""
+def wrapped(angle: Any) -> Any:
+    """Wraps an angle or an array of angles to (-pi, pi], rad."""
     return math.pi - (math.pi - angle) % (2.0 * math.pi)

@@ -44,7 +44,7 @@ def test_places_are_as_uncertain_as_the_table_of_sensitivities_says(bearing):
     expected = predicted_std(
         ArrayErrors(position_m=1e-4, delay_s=1e-7, sound_speed_share=1e-3), p_AS, row, C
     )
-    budget = ArrayBudget.of(row, 1e-4, 1e-3 * C, 1e-7)
+    budget = ArrayBudget(1e-8 * np.eye(row.p_AM.size), 1e-3 * C, 1e-7)
     ranges = np.linalg.norm(p_AS - row.p_AM, axis=1)
     covariance = budget.delay_covariance(p_AS / 2.0, 0.5, row, C)
     fix = locate_source((ranges[1:] - ranges[0]) / C, covariance, row, C)

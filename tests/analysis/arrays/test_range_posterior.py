@@ -27,7 +27,7 @@ def test_row_as_by_a_sum_over_a_fine_grid_of_places():
 
     Ranges outside of the grid are less likely by 1e-6 and more.
     """
-    budget = ArrayBudget.of(ROW, 0.002, 2.0, 1e-6)
+    budget = ArrayBudget(0.002**2 * np.eye(ROW.p_AM.size), 2.0, 1e-6)
     own = 1e-12 * (np.eye(2) + 1.0)
     angle = np.radians(25.0)
     u = np.array([np.cos(angle), np.sin(angle)])
@@ -57,7 +57,7 @@ def test_row_as_by_a_sum_over_a_fine_grid_of_places():
 )
 def test_two_of_three_ranges_are_within_what_is_stated(shape, position_std):
     rng = np.random.default_rng(4)
-    budget = ArrayBudget.of(shape, position_std, 0.01 * C)
+    budget = ArrayBudget(position_std**2 * np.eye(shape.p_AM.size), 0.01 * C, 0.0)
     own = (5e-7) ** 2 * (np.eye(shape.count - 1) + 1.0)
     off = []
     for _ in range(300):

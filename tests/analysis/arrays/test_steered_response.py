@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, strategies as st
 
 from analysis.arrays.steered_response import (
-    LAG_DENSITY,
     SearchGrid,
     centroid_delays,
     steered_response,
@@ -27,10 +26,7 @@ ARRAYS: dict[str, list[list[float]]] = {
     "large": [[0, 0, 0], [1.2, 0, 0.1], [1.1, 1, 0.5], [0.1, 0.9, 1], [0.6, 0.4, 1.3]],
 }
 SHAPES = {name: ArrayShape.of(places) for name, places in ARRAYS.items()}
-GRIDS = {
-    name: SearchGrid.of(shape, C, HIGH, LAG_DENSITY * HIGH)
-    for name, shape in SHAPES.items()
-}
+GRIDS = {name: SearchGrid.of(shape, C, HIGH, 0.032) for name, shape in SHAPES.items()}
 
 
 @st.composite
@@ -113,7 +109,7 @@ def test_many_microphones_have_a_grid_of_4_deg(count, dimension):
     """It is no finer than that, and no direction is farther from it."""
     rng = np.random.default_rng(count)
     shape = ArrayShape.of(rng.uniform(-0.15, 0.15, (count, dimension)))
-    grid = SearchGrid.of(shape, C, HIGH, LAG_DENSITY * HIGH)
+    grid = SearchGrid.of(shape, C, HIGH, 0.032)
     far = grid.p_AS[grid.inverse_range == 0.0]
     far = far[np.linalg.norm(far, axis=1) > 1.0 - 1e-9]
     # A sphere is covered by caps of 4 deg at 4 pi / 0.0698^2 = 2579 points.

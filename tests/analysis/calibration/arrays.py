@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from analysis.calibration.measured_sound import MeasuredSound
+from analysis.calibration.calibration_sounds import MeasuredSound
 
 SQUARE = np.array(
     [[0.5, 0.5, 0.0], [-0.5, 0.5, 0.0], [-0.5, -0.5, 0.0], [0.5, -0.5, 0.0]]

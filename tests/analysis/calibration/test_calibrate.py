@@ -11,13 +11,17 @@ import pytest
 import soundfile
 
 import phonotaxis
-from analysis.calibration.calibrate import calibrate, calibration_run
-from analysis.calibration.calibrated_geometry import (
+from analysis.calibration.calibrate import (
+    calibrate,
     calibrated_fields,
-    write_calibration,
+    calibration_run,
 )
 from analysis.calibration.calibration_sounds import load_calibration_sounds
-from analysis.calibration.calibration_text import calibration_document, calibration_text
+from analysis.calibration.calibration_text import (
+    calibration_document,
+    calibration_text,
+    write_calibration,
+)
 from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
 from analysis.recordings.heard_sounds import heard_sound, sightings_of
 from analysis.recordings.recording_search import Sighting
@@ -133,6 +137,20 @@ def test_recordings_of_known_places(capsys, nine, tmp_path):
     assert call(capsys, "locate", folder / "0.wav", "--geometry", out / "array.yaml")[
         0
     ] in (0, 2)
+
+
+def test_python_gives_what_the_command_prints(capsys, nine, tmp_path):
+    folder, _, _, entries = nine
+    words = [listing(folder, entries), folder / "array.yaml"]
+    status, printed, _ = call(capsys, "calibrate", words[0], "--geometry", words[1])
+    assert status == 0
+    found = phonotaxis.calibrate(*words)
+    assert str(found) == printed.rstrip("\n")
+    assert found.notes == ()
+    out = found.save(tmp_path / "out")
+    assert found.geometry == load_geometry(out / "array.yaml")
+    points = found.plot().axes[0].lines[0].get_xydata()
+    np.testing.assert_array_equal(points, SQUARE[:, :2])
 
 
 def test_a_wrong_position_is_named_on_the_terminal(capsys, nine):

@@ -10,17 +10,16 @@ import pytest
 from scipy.optimize import least_squares
 
 from analysis.arrays.array_budget import ArrayBudget
+from analysis.arrays.wave_fronts import wave_front
 from analysis.calibration.calibration import calibrate_array
 from analysis.calibration.calibration_misfit import calibration_misfit
-from analysis.calibration.measured_sound import MeasuredSound
+from analysis.calibration.calibration_sounds import MeasuredSound
 from analysis.calibration.observability import (
     calibration_gains,
     gain_ratios,
     gains_nothing,
 )
-from analysis.calibration.wave_fronts import wave_front
 from systems.framework.input_error import InputError
-from systems.sound.array_shape import ArrayShape
 from tests.analysis.calibration.arrays import (
     LATE_STD,
     NOISE_STD,
@@ -39,7 +38,7 @@ from tests.analysis.calibration.arrays import (
 
 
 def budget(places, std=PLACE_STD):
-    return ArrayBudget.of(ArrayShape.of(places), std, SPEED_STD, LATE_STD)
+    return ArrayBudget(std**2 * np.eye(np.size(places)), SPEED_STD, LATE_STD)
 
 
 def cramer_rao(nominal, spots, *, known=True):
@@ -266,7 +265,7 @@ def test_lateness_is_found_where_it_is_expected():
     rng = np.random.default_rng(10)
     late = 1e-4 * rng.standard_normal(6)
     sounds = measured(SIX, C, late, spots_around(9, rng), rng)
-    known = ArrayBudget.of(ArrayShape.of(SIX), 1e-3, SPEED_STD, 1e-4)
+    known = ArrayBudget(1e-6 * np.eye(np.size(SIX)), SPEED_STD, 1e-4)
     found = calibrate_array(SIX, C, known, sounds)
     off = found.channel_delays - (late - late.mean())
     assert np.abs(off).max() < 2e-5
@@ -302,7 +301,7 @@ def test_no_sounds_and_nothing_unknown():
     with pytest.raises(InputError, match="at least one"):
         calibrate_array(SQUARE, C, budget(SQUARE), [])
     sound = MeasuredSound(np.zeros(3), noise_covariance(4), np.array([0.0, 0.0, 2.0]))
-    exact = ArrayBudget.of(ArrayShape.of(SQUARE), 0.0)
+    exact = ArrayBudget(0.0 * np.eye(np.size(SQUARE)), 0.0, 0.0)
     with pytest.raises(InputError, match="state how uncertain"):
         calibrate_array(SQUARE, C, exact, [sound])
     with pytest.raises(InputError, match="5 delays"):

@@ -12,14 +12,17 @@ import pytest
 from matplotlib.patches import Ellipse
 
 from analysis.hearing.cramer_rao import LocalizationBound
-from analysis.hearing.listening import Heard, Listener
+from analysis.hearing.listener import Heard, Listener
 from analysis.hearing.localization import (
     LocalizationCell,
     LocalizationExperiment,
     prepare_localization,
 )
 from analysis.hearing.localization_plots import plot_localization
-from analysis.hearing.localization_report import localization_summary, localization_text
+from analysis.hearing.localization_report import (
+    localization_document,
+    localization_text,
+)
 from analysis.hearing.paper_tables import PAPER_CELLS
 from analysis.hearing.sensitivity import PolarStd
 
@@ -39,7 +42,7 @@ def cells(experiment) -> list[LocalizationCell]:
 
 @pytest.fixture(scope="module")
 def summary(experiment, cells):
-    return localization_summary(experiment, cells, None)
+    return localization_document(experiment, cells)
 
 
 def test_every_place_has_every_estimator(cells):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from analysis.hearing.free_field import Loudspeaker, frame_estimator
 from analysis.hearing.sensitivity import ArrayErrors, measured_std, predicted_std
+from analysis.hearing.single_frames import Loudspeaker, frame_estimator
 from systems.base.robot import RobotParameters
 from systems.hearing.multilateration import locate_source
 from systems.hearing.parameters import TDOAParameters

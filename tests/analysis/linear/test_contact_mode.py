@@ -142,3 +142,12 @@ def test_table_marks_today_and_falls_with_lag_and_latency():
     np.testing.assert_allclose(
         limits.reference_stiffness_n_m, limits.stiffness_n_m * math.e**2
     )
+
+
+def test_approaching_obstacles_damp():
+    """D_0 on the change over a tick acts as on a velocity half a tick ago."""
+    damped = contact_model(Scenario(), 12.0, approach_damping_n_s_m=0.8).growth_per_s
+    as_velocity = contact_model(Scenario(), 12.0, damping_n_s_m=1.8).growth_per_s
+    plain = contact_model(Scenario(), 12.0).growth_per_s
+    # The damper acts on the true motion, behind the motors' lag.
+    assert plain - damped == pytest.approx(plain - as_velocity, rel=0.2)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.listening.live_hearing import HeardStream, LiveHearing, listen
+from analysis.listening.live_hearing import HeardStream, LiveHearing, listen_to
 from analysis.listening.sound_stream import SoundBlock, SoundStream, StreamBrokenError
 from analysis.recordings.array_geometry import ArrayGeometry
 from systems.framework.input_error import InputError
@@ -36,7 +36,7 @@ def hear(samples, geometry=GEOMETRY, blocks=None) -> tuple[HeardStream, Told, Na
     told: Told = []
     named: Named = []
     hearing = LiveHearing(stream, geometry, lambda fault, t: named.append((t, fault)))
-    heard = listen(
+    heard = listen_to(
         hearing,
         lambda step: told.extend(
             (step.sources.t_s, track.identity, math.degrees(track.bearing))

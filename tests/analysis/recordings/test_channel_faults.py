@@ -46,7 +46,7 @@ def recording(shape, p_AS, *, snr_db=20.0, seed=0):
 
 
 def found_faults(samples, shape, position_std=0.0005, gain_std_db=0.0):
-    budget = ArrayBudget.of(shape, position_std)
+    budget = ArrayBudget(position_std**2 * np.eye(shape.p_AM.size), 0.0, 0.0)
     array = KnownArray(shape, C, budget, gain_std_db=gain_std_db)
     return find_channel_faults(samples, array, sample_rate_hz=FS)
 

@@ -8,7 +8,7 @@ import soundfile
 
 from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.clock_drift import clock_drift, common_lags, recording_drift
-from analysis.recordings.locate import locate
+from phonotaxis import locate
 from systems.framework.input_error import InputError
 from tests.analysis.listening.plane_waves import RATE, SOUND_SPEED, SQUARE, plane_waves
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.recordings.channel_order import FrameDelays
-from analysis.recordings.delay_scale import DelayScale, delay_scale
+from analysis.recordings.frame_delays import DelayScale, FrameDelays, delay_scale
 from systems.sound.array_shape import ArrayShape
 
 METRES_PER_SAMPLE = 340.0 / 16_000.0

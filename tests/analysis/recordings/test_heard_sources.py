@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.hearing.synthetic_speech import speech_like
 from analysis.recordings.heard_sources import heard_sources
 from studies.support.moving_talkers import moving_sound, ring_scene
+from studies.support.synthetic_speech import speech_like
 from studies.support.talker_trials import (
     TALKER_ARRAYS,
     heard_from,

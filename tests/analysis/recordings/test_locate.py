@@ -11,8 +11,8 @@ import pytest
 import soundfile
 
 from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
-from analysis.recordings.locate import locate
 from analysis.recordings.locate_text import locate_text
+from phonotaxis import locate
 
 C = 340.0
 ROBOT = np.array([[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]])
@@ -61,7 +61,7 @@ def geometry(folder, text):
 def test_robots_own_array(tmp_path, rate, bearing):
     path = record(tmp_path / "a.wav", ROBOT, polar(bearing, 1.5), rate=rate)
     result = locate(path)
-    summary = result.summary()
+    summary = result.main_source()
     # 8 kHz leaves 3.4 of the 8 kHz, and range is the more sensitive.
     accuracy = 0.05 if rate == 8_000 else 0.01
     assert summary["bearing_deg"] == pytest.approx(bearing, abs=20 * accuracy)
@@ -89,7 +89,7 @@ def test_any_place_orientation_and_order(tmp_path, turn_deg, order):
     source = matrix @ polar(20.0, 1.2) + [3.0, -2.0]
     path = record(tmp_path / "a.wav", places[list(order)], source)
     known = array(places[list(order)])
-    summary = locate(path, known).summary()
+    summary = locate(path, known).main_source()
     assert summary["bearing_deg"] == pytest.approx(20.0 + turn_deg, abs=0.2)
     assert summary["range_m"] == pytest.approx(1.2, rel=0.02)
     assert summary["ambiguity"] == "front_back"
@@ -107,7 +107,9 @@ def test_row_along_x_looks_to_plus_y(tmp_path):
     places = ROBOT[:, ::-1].copy()
     path = record(tmp_path / "a.wav", places, polar(70.0, 1.5))
     known = array(places)
-    assert locate(path, known).summary()["bearing_deg"] == pytest.approx(70.0, abs=0.2)
+    assert locate(path, known).main_source()["bearing_deg"] == pytest.approx(
+        70.0, abs=0.2
+    )
 
 
 def test_channels_name_the_columns(tmp_path):
@@ -119,8 +121,8 @@ def test_channels_name_the_columns(tmp_path):
     soundfile.write(tmp_path / "b.wav", columns, rate, subtype="PCM_24")
     text = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\nchannels: [4, 0, 2]\n"
     result = locate(tmp_path / "b.wav", load_geometry(geometry(tmp_path, text)))
-    assert result.summary()["bearing_deg"] == pytest.approx(25.0, abs=0.1)
-    assert result.to_dict()["array"]["channels"] == [4, 0, 2]
+    assert result.main_source()["bearing_deg"] == pytest.approx(25.0, abs=0.1)
+    assert result.document()["array"]["channels"] == [4, 0, 2]
 
 
 @pytest.mark.parametrize(
@@ -130,7 +132,7 @@ def test_speed_of_sound_is_used(tmp_path, line, c):
     path = record(tmp_path / "a.wav", ROBOT, polar(40.0, 1.5), c=c)
     text = f"microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n{line}\n"
     text += "position_std_m: 0.001\n"
-    summary = locate(path, load_geometry(geometry(tmp_path, text))).summary()
+    summary = locate(path, load_geometry(geometry(tmp_path, text))).main_source()
     assert summary["bearing_deg"] == pytest.approx(40.0, abs=0.1)
     assert summary["range_m"] == pytest.approx(1.5, rel=0.02)
 
@@ -139,7 +141,7 @@ def test_three_dimensional_places_of_a_level_row(tmp_path):
     path = record(tmp_path / "a.wav", ROBOT, polar(25.0, 1.5))
     text = "microphones: [[0, 0.4, 1], [0, 0, 1], [0, -0.4, 1]]\n"
     result = locate(path, load_geometry(geometry(tmp_path, text)))
-    assert result.summary()["bearing_deg"] == pytest.approx(25.0, abs=0.1)
+    assert result.main_source()["bearing_deg"] == pytest.approx(25.0, abs=0.1)
     assert result.estimates[0].elevation_deg is None
 
 
@@ -196,7 +198,7 @@ def test_arrays_of_any_shape(tmp_path, name, bearing, elevation, distance, range
     heard_by = np.pad(places, ((0, 0), (0, 3 - places.shape[1])))
     source = heard_by.mean(axis=0) + p_AS
     path = record(tmp_path / "a.wav", heard_by, source, rate=16_000, high=6_000.0)
-    summary = locate(path, array(places)).summary()
+    summary = locate(path, array(places)).main_source()
     assert summary["bearing_deg"] == pytest.approx(bearing, abs=0.3)
     if places.shape[1] == 3:
         assert summary["elevation_deg"] == pytest.approx(elevation, abs=0.5)
@@ -215,7 +217,7 @@ def test_many_microphones(tmp_path, count, dimension):
     source = np.array([*polar(-70.0, 2.0), 0.5][:dimension])
     path = record(tmp_path / "a.wav", places, source, rate=16_000, seconds=0.25)
     p_AS = source - places.mean(axis=0)
-    summary = locate(path, array(places)).summary()
+    summary = locate(path, array(places)).main_source()
     bearing = math.degrees(math.atan2(p_AS[1], p_AS[0]))
     assert summary["bearing_deg"] == pytest.approx(bearing, abs=0.3)
 
@@ -225,11 +227,11 @@ def test_upright_row_tells_the_elevation_alone(tmp_path):
     source = places.mean(axis=0) + 3.0 * np.array([0.6, 0.0, 0.8])
     path = record(tmp_path / "a.wav", places, source)
     result = locate(path, array(places))
-    summary = result.summary()
+    summary = result.main_source()
     assert summary["bearing_deg"] is None
     assert summary["elevation_deg"] == pytest.approx(53.13, abs=0.5)
     assert "bearing" not in summary["observable"]
-    json.dumps(result.to_dict(), allow_nan=False)
+    json.dumps(result.document(), allow_nan=False)
     assert "elevation 53" in locate_text(result)
 
 
@@ -318,7 +320,7 @@ def test_inverted_channel_is_mended_and_named(tmp_path):
     path = record(tmp_path / "a.wav", places, polar(60.0, 2.0))
     summary = locate(
         altered(path, lambda x: x * [1, 1, -1, 1, 1, 1]), array(places)
-    ).summary()
+    ).main_source()
     assert summary["bearing_deg"] == pytest.approx(60.0, abs=0.3)
     (fault,) = summary["faults"]
     assert (fault["kind"], fault["channels"]) == ("inverted", (2,))
@@ -334,7 +336,7 @@ def test_clipped_channel_is_named(tmp_path):
     assert "channel 6: clipped" in result.faults[0].message
     # The command names faults on standard error, once.
     assert "clipped" not in locate_text(result)
-    assert result.summary()["bearing_deg"] == pytest.approx(60.0, abs=1.0)
+    assert result.main_source()["bearing_deg"] == pytest.approx(60.0, abs=1.0)
 
 
 def test_channels_that_are_counted_from_one(tmp_path):
@@ -356,7 +358,7 @@ def test_digital_silence_around_a_sound(tmp_path):
         return np.pad(samples, ((5 * 48_000, 48_000), (0, 0)))
 
     result = locate(altered(path, padded))
-    assert result.summary()["bearing_deg"] == pytest.approx(25.0, abs=0.1)
+    assert result.main_source()["bearing_deg"] == pytest.approx(25.0, abs=0.1)
     half = result.array["frame_s"] / 2.0
     for estimate in result.estimates:
         assert 5.0 - half <= estimate.t_s <= 5.5 + half
@@ -374,7 +376,7 @@ def test_source_amid_the_array_is_at_no_other_place(tmp_path, places, distance):
 def test_source_right_above_a_flat_array_has_no_bearing(tmp_path, height):
     places = np.array(ARRAYS["circle"])
     path = record(tmp_path / "a.wav", np.pad(places, ((0, 0), (0, 1))), (0, 0, height))
-    assert locate(path, array(places)).summary()["bearing_deg"] is None
+    assert locate(path, array(places)).main_source()["bearing_deg"] is None
 
 
 def test_uneven_array_near_a_source_knows_what_curvature_costs(tmp_path):
@@ -383,7 +385,7 @@ def test_uneven_array_near_a_source_knows_what_curvature_costs(tmp_path):
     source = np.array([*polar(100.0, 2.0), 1.0])
     path = record(tmp_path / "a.wav", places, source)
     known = array(places).model_copy(update={"sound_speed_std": 0.01 * C})
-    summary = locate(path, known).summary()
+    summary = locate(path, known).main_source()
     assert summary["range_m"] is None
     error = abs(summary["bearing_deg"] - 100.0)
     assert 0.5 < error < 2.0 * summary["bearing_std_deg"]
@@ -393,7 +395,7 @@ def test_far_source_has_no_range(tmp_path):
     """At 10 km the range's standard deviation exceeds the range."""
     path = record(tmp_path / "a.wav", ROBOT, polar(30.0, 1e4), snr_db=10.0)
     result = locate(path)
-    summary = result.summary()
+    summary = result.main_source()
     assert summary["bearing_deg"] == pytest.approx(30.0, abs=0.5)
     assert summary["range_m"] is None
     assert summary["observable"] == ["bearing"]
@@ -404,7 +406,7 @@ def test_far_source_has_no_range(tmp_path):
 def test_noise_has_no_bearing(tmp_path):
     noise = np.random.default_rng(2).standard_normal((24_000, 3)) * 0.1
     soundfile.write(tmp_path / "a.wav", noise, 48_000)
-    document = locate(tmp_path / "a.wav").to_dict()
+    document = locate(tmp_path / "a.wav").document()
     assert document["estimates"] == []
     assert document["summary"]["bearing_deg"] is None
     assert document["summary"]["observable"] == []
@@ -414,7 +416,7 @@ def test_noise_has_no_bearing(tmp_path):
 def test_document_has_the_keys_that_others_rely_on(tmp_path):
     path = record(tmp_path / "a.wav", ROBOT, polar(25.0, 1.5))
     result = locate(path)
-    document = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    document = json.loads(json.dumps(result.document(), allow_nan=False))
     assert document["schema_version"] == 1
     assert {"array", "estimates", "summary"} <= document.keys()
     assert {
@@ -448,7 +450,7 @@ def test_positions_in_other_units_are_refused(tmp_path, times, says):
     """6.5 cm across: in cm, and in a unit of 10 m."""
     source = np.array([*polar(150.0, 1.5), 0.5])
     path = record(tmp_path / "a.wav", SMALL_SQUARE, source, rate=16_000, seconds=1.0)
-    bearing = locate(path, array(SMALL_SQUARE)).summary()["bearing_deg"]
+    bearing = locate(path, array(SMALL_SQUARE)).main_source()["bearing_deg"]
     assert bearing == pytest.approx(150.0, abs=0.3)
     with pytest.raises(ValueError, match=says):
         locate(path, array(times * SMALL_SQUARE))

@@ -7,7 +7,7 @@ import pytest
 import soundfile
 
 from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
-from analysis.recordings.locate import locate
+from phonotaxis import locate
 
 #: (samples, 3) noise in three channels.
 THREE = 0.1 * np.random.default_rng(0).standard_normal((9_600, 3))

@@ -11,7 +11,7 @@ import soundfile
 from scipy import signal
 
 from analysis.recordings.array_geometry import ArrayGeometry
-from analysis.recordings.locate import locate
+from phonotaxis import locate
 
 RATE = 16_000
 ROOM_M = (6.0, 5.0, 2.8)
@@ -83,7 +83,7 @@ def record(path, places, bearing, elevation, distance, t60, snr_db=20.0):
 )
 def test_bearing_in_a_room(tmp_path, places, bearing, elevation, distance, t60):
     result = record(tmp_path / "a.wav", places, bearing, elevation, distance, t60)
-    summary = result.summary()
+    summary = result.main_source()
     errors = [(e.bearing_deg - bearing + 180) % 360 - 180 for e in result.estimates]
     assert len(errors) >= 10
     assert abs((summary["bearing_deg"] - bearing + 180) % 360 - 180) < 3.0
@@ -95,7 +95,7 @@ def test_bearing_in_a_room(tmp_path, places, bearing, elevation, distance, t60):
 
 def test_range_of_a_long_row_in_a_room(tmp_path):
     result = record(tmp_path / "a.wav", ROW, 25.0, 0.0, 1.5, 0.3)
-    summary = result.summary()
+    summary = result.main_source()
     assert summary["bearing_deg"] == pytest.approx(25.0, abs=1.0)
     assert summary["range_m"] == pytest.approx(1.5, rel=0.1)
     assert summary["alternatives"][0]["bearing_deg"] == pytest.approx(155.0, abs=1.0)

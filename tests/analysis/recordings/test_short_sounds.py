@@ -10,8 +10,8 @@ import pytest
 import soundfile
 
 from analysis.recordings.array_geometry import ArrayGeometry
-from analysis.recordings.locate import locate
-from analysis.recordings.onset_spectra import OnsetSpectra
+from analysis.recordings.recording_spectra import OnsetSpectra
+from phonotaxis import locate
 from systems.delays.delay_sets import consistent_lags
 from systems.sound.array_shape import ArrayShape
 

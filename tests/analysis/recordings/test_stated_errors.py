@@ -10,6 +10,7 @@ import pytest
 from analysis.recordings.aligned_delays import AlignedDelays
 from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.locate import hear
+from analysis.recordings.prepared_recording import RecordedSamples
 from analysis.recordings.source_placement import has_place, place_source
 
 C, RATE = 343.0, 48_000
@@ -154,7 +155,8 @@ def test_side_lobes_are_no_delays_where_microphones_stand_elsewhere(length):
     for _ in range(5):
         places = stated + 0.03 * rng.standard_normal(stated.shape)
         sounds = [(0.4, length)]
-        heard = hear(free_field(places, source, sounds, rng), RATE, known, "noise")
+        samples = free_field(places, source, sounds, rng)
+        heard = hear(RecordedSamples(samples, RATE, "noise"), known)
         true = delays(places, source).tau
         assert heard.sightings
         off = np.array([np.abs(s.tau - true).max() for s in heard.sightings])

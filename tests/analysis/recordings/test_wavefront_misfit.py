@@ -24,7 +24,9 @@ NOISE_S = 1e-6
 def known(places):
     """As places measured with care, and air of which little is known."""
     shape = ArrayShape.of(places)
-    return KnownArray(shape, C, ArrayBudget.of(shape, 0.0005, 0.01 * C))
+    return KnownArray(
+        shape, C, ArrayBudget(0.0005**2 * np.eye(shape.p_AM.size), 0.01 * C, 0.0)
+    )
 
 
 def sightings(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.reporting.fact_tables import fact_table, readable_name, row_table
+from analysis.reporting.fact_tables import fact_table, readable_name
 
 
 @pytest.mark.parametrize(
@@ -38,13 +38,3 @@ def test_facts_of_groups_stand_under_their_group():
         ["margins: delay (s)", 0.5],
         ["none", None],
     ]
-
-
-def test_rows_of_mappings():
-    rows: list[dict[str, object]] = [
-        {"speed_m_s": 0.3, "kind": "sink"},
-        {"speed_m_s": None, "kind": "saddle"},
-    ]
-    table = row_table(rows)
-    assert table.columns == ["speed (m/s)", "kind"]
-    assert table.rows == [[0.3, "sink"], [None, "saddle"]]

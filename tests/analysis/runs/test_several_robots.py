@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analysis.runs.metric_table import run_metrics
-from analysis.runs.run_report import run_summary, summary_text
+from analysis.runs.run_report import run_document, run_text
 from analysis.views.picture import plot_trajectory
 from analysis.views.replay import record, write_replay
 from analysis.views.run_directory import write_run
@@ -39,18 +39,18 @@ def test_metrics_are_those_of_each_robot(convoy):
 
 
 def test_summary_names_each_robot(convoy):
-    summary = run_summary(convoy, None)
+    summary = run_document(convoy)
     assert {name: row["cause"] for name, row in summary["robots"].items()} == {
         "leader": "completed",
         "second": "completed",
     }
-    text = summary_text(convoy, summary)
+    text = run_text(convoy, summary)
     assert text.count("follow distance") == 2
     assert "second                completed, law active" in text
 
 
 def test_a_directory_holds_files_of_each_robot(convoy, tmp_path):
-    write_run(convoy, run_summary(convoy, tmp_path), tmp_path)
+    write_run(convoy, run_document(convoy), tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     assert {f"time_series_{robot}.png" for robot in convoy.robots} <= names
     assert {f"diagram_{robot}.svg" for robot in convoy.robots} <= names

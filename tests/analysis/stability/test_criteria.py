@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from analysis.certificates.energy_certificate import certify_energy
+from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.linear_parts import (
     LINEAR_MODELS,
     OPERATING_POINTS,
@@ -21,7 +22,6 @@ from analysis.stability.linear_parts import (
     count_jams,
 )
 from analysis.stability.margin_parts import MARGINS
-from analysis.stability.nonlinear_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.report_parts import ROUTE_PARTS, SEARCH_PARTS, SOUND_PARTS
 from analysis.stability.robustness_parts import (
     CONTACT_ROBUSTNESS,

@@ -86,7 +86,7 @@ def test_laws_are_chosen_once_each():
 
 def test_document_of_one_law_has_its_parts_at_the_top():
     analysis = analyse_law(load_scenario(), [MASS, REFUSED, SPREAD])
-    document = stability_document([analysis], None)
+    document = stability_document([analysis])
     assert document["law"] == "active"
     assert document["mass"] == 3.94
     assert document["refused"] == {"problem": "law: cannot; choose another"}
@@ -127,7 +127,7 @@ def test_a_section_is_added_as_docs_extending_says():
     exec(compile(page_file("extending.md", "nichols.py"), "nichols.py", "exec"), names)
     parts = [OPERATING_POINTS, MARGINS, names["NICHOLS"]]
     analysis = analyse_law(load_scenario("obstacle_free", ["law=none"]), parts)
-    document = stability_document([analysis], None)
+    document = stability_document([analysis])
     loops = document["margins"]["implemented_loop"]["margins"]
     assert document["nichols"]["L at the sensor, along"] == pytest.approx(
         loops["sensor_along"]["crossover_rad_s"]

@@ -22,7 +22,7 @@ def analyses():
     scenario = load_scenario("unknown_block")
     laws = ["trajectory_adaptive", "trajectory_filtered"]
     scenarios = chosen_laws(scenario, laws)
-    work = parts_for(scenarios, full=False)
+    work = parts_for(scenarios)
     return [analyse_law(each, work) for each in scenarios]
 
 
@@ -40,7 +40,7 @@ def test_every_part_is_there_or_says_why_not(analyses):
 
 
 def test_the_document_has_the_numbers(analyses):
-    document = stability_document(analyses[:1], None)
+    document = stability_document(analyses[:1])
     assert [row["at"]["name"] for row in document["frozen_gains"]] == [
         "on the route",
         "at rest",

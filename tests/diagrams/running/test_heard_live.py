@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import LeafSystem
 
-from analysis.listening.live_hearing import HeardStep, LiveHearing, listen
+from analysis.listening.live_hearing import HeardStep, LiveHearing, listen_to
 from analysis.listening.sound_pipe import open_pipe
 from analysis.recordings.array_geometry import load_geometry
-from analysis.recordings.locate import locate
 from diagrams import (
     RunAudio,
     build_sound_follower,
@@ -21,6 +20,7 @@ from diagrams import (
     simulate,
 )
 from docs.building.page_code import page_file
+from phonotaxis import locate
 
 SECONDS = 1.5
 # The robot is all but at rest, and has the source to its left.
@@ -62,7 +62,7 @@ def listened(folder):
     told: list[HeardStep] = []
     geometry = load_geometry(folder / "array.yaml")
     stream = open_pipe((folder / "heard.wav").open("rb"), raw_channels=3)
-    heard = listen(LiveHearing(stream, geometry), told.append)
+    heard = listen_to(LiveHearing(stream, geometry), told.append)
     assert not heard.faults
     return [step.sources for step in told]
 

@@ -14,7 +14,6 @@ import soundfile
 from numpy.typing import NDArray
 
 from analysis.recordings.array_geometry import load_geometry
-from analysis.recordings.locate import locate
 from diagrams import (
     RunAudio,
     build_sound_follower,
@@ -22,6 +21,7 @@ from diagrams import (
     make_simulator,
     simulate,
 )
+from phonotaxis import locate
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
 from systems.hearing.cross_power_estimator import CrossPowerEstimator
@@ -166,7 +166,7 @@ def test_locate_finds_a_source_at_rest(tmp_path):
     result, _ = saved(tmp_path, "drake", "obstacle_free", "duration_s=0.6", *places)
     geometry = load_geometry(tmp_path / "array.yaml")
     found = locate(tmp_path / "heard.wav", geometry)
-    rows = found.to_dict()["estimates"]
+    rows = found.document()["estimates"]
     assert len(rows) >= 5
     for row in rows:
         # The robot turns while it hears: the truth is that of the stretch's middle.

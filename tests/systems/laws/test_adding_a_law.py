@@ -31,7 +31,7 @@ from analysis.laws.law_curves import law_curves
 from analysis.laws.law_curves_plots import plot_law_curves
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from analysis.laws.radial_law import radial_law
-from analysis.linear.root_locus import root_loci
+from studies.linear.root_locus import root_loci
 from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import analyse_law
 from analysis.stability.model_sheet import model_sheet
@@ -80,7 +80,7 @@ print(json.dumps({
 def add_law(tree: Path) -> None:
     """Ours by links, but for the room of the laws: that is a copy with one more."""
     tree.mkdir()
-    for name in ("analysis", "phonotaxis", "tools"):
+    for name in ("analysis", "phonotaxis", "studies", "tools"):
         (tree / name).symlink_to(ROOT / name)
     own = {"laws", "__pycache__", "scenario.schema.json"}
     for package in ("systems", "diagrams"):

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.arrays.voting.direction_votes import VotePlan, cast_votes, join_votes
 from analysis.arrays.voting.vote_peaks import gather_sources
-from analysis.hearing.synthetic_speech import speech_like
+from studies.support.synthetic_speech import speech_like
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 16_000, 343.0
@@ -133,7 +133,6 @@ def test_blocks_that_cannot_be_heard(change, says):
         ({"c": 0.34}, "c: .* m/s"),
         ({"sample_rate_hz": 10.0}, "sample_rate_hz"),
         ({"band_hz": (500.0, 400.0)}, "band_hz"),
-        ({"least_ratio": 0.5}, "least_ratio"),
     ],
 )
 def test_plans_that_make_no_sense(settings, says):

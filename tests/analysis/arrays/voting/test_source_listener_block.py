@@ -10,7 +10,7 @@ from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.direction_votes import VotePlan
 from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
@@ -71,7 +71,7 @@ def listening(counts: np.ndarray, rate: float = 16_000.0):
 def test_frames_through_the_block_give_the_tracks_of_the_pure_function():
     counts = noise_from(35.0)
     shape = ArrayShape.of(microphones_B(RobotParameters()))
-    plan = vote_plan(shape, SOUND_SPEED_M_S, 16_000.0, (200.0, 8_000.0))
+    plan = VotePlan.of(shape, SOUND_SPEED_M_S, 16_000.0)
     steps, _ = hear_sources(
         counts, ListenerMemory.blank(plan), plan, ListenerParameters()
     )

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from analysis.arrays.voting.source_tracks import (
-    Detection,
     TrackMemory,
     TrackParameters,
     step_tracks,
 )
+from analysis.arrays.voting.vote_peaks import VotedSource
 
 STD = math.radians(2.0)
 
@@ -26,8 +26,8 @@ def follow(ways, steps, step_s=0.1, seed=0):
         if len(at) == 2 and abs(at[0] - at[1]) < 12.0:
             at = [0.5 * (at[0] + at[1])]
         detections = [
-            Detection(math.radians(a + 2.0 * rng.standard_normal()), STD, None)
-            for a in at
+            VotedSource(bearing, STD, None, share=1.0, votes=10, confidence=1.0)
+            for bearing in np.radians([a + 2.0 * rng.standard_normal() for a in at])
         ]
         tracks, memory = step_tracks(detections, t, memory, TrackParameters())
         told.append((t, tracks))

@@ -1,1 +1,0 @@
-"""Commands that list scenarios, laws and fields, and that check the installation."""

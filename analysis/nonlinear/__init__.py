@@ -1,1 +1,0 @@
-"""Results from nonlinear models: velocity terms, oscillations, equilibria, phases."""

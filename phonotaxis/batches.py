@@ -1,0 +1,279 @@
+"""Batches of runs: sweeps, and comparisons of laws."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from analysis.reporting.result_directory import whole_directory
+from analysis.sweeps.batch import (
+    Batch,
+    PreparedBatch,
+    Summary,
+    prepare_batch,
+    prepare_comparison,
+)
+from analysis.sweeps.comparison_plans import EXPERIMENTS, comparison_plan
+from analysis.sweeps.page import write_batch
+from analysis.sweeps.plan import SweepPlan, load_sweep
+from analysis.sweeps.plots import plot_cells
+from analysis.sweeps.report import batch_document, batch_text, warning_lines
+from phonotaxis.result import Prepared, Result, ignore
+from systems.framework.input_error import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from analysis.sweeps.pairs import Pair
+
+__all__ = ["ComparisonResult", "SweepResult", "compare", "sweep"]
+
+
+@dataclass(frozen=True, repr=False)
+class BatchResult(Result):
+    """Results of many runs. The directory ``out`` contains their files."""
+
+    batch: Batch
+
+    @property
+    def out(self) -> Path:
+        """Directory of the results, which contains ``report.html``."""
+        return self.batch.out
+
+    def document(self) -> dict[str, Any]:
+        """Returns the JSON document of the command."""
+        return batch_document(self.batch)
+
+    def __str__(self) -> str:
+        """Tables of the results, for a terminal."""
+        return batch_text(self.batch, self.document())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Number of runs with each warning."""
+        every = self.batch.summaries.values()
+        return tuple(line for each in every for line in warning_lines(each))
+
+    def plot(self) -> dict[str, Figure]:
+        """Draws the rates and metrics of all cells, one figure for each scenario."""
+        return {
+            name: plot_cells(each.plan, each.rows)
+            for name, each in self.batch.summaries.items()
+        }
+
+    def write(self, document: dict[str, Any], directory: Path) -> None:
+        """Writes the page, the JSON document and the examples into ``out``.
+
+        Args:
+            document: The JSON document.
+            directory: The directory ``out``.
+
+        Raises:
+            RunError: Every run failed.
+        """
+        write_batch(self.batch, document)
+        self.batch.require_runs()
+
+    def save(self, directory: str | Path | None = None) -> Path:
+        """Copies the directory ``out``, which already contains all files.
+
+        Args:
+            directory: New or empty directory for the copy. None means no copy.
+
+        Returns:
+            Path of the copy, or ``out``.
+
+        Raises:
+            InputError: The directory is in use, or cannot be created or written.
+        """
+        if directory is None:
+            return self.out
+        with whole_directory(directory) as (shown, partial):
+            shutil.copytree(self.out, partial, dirs_exist_ok=True)
+        return shown
+
+
+class SweepResult(BatchResult):
+    """Results of a sweep: many runs in one table."""
+
+    @property
+    def plan(self) -> SweepPlan:
+        """Plan of the sweep."""
+        return self._only.plan
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """Table with one row per run: fields, ending and metrics (docs/compare.md)."""
+        return self._only.rows
+
+    @property
+    def _only(self) -> Summary:
+        (only,) = self.batch.summaries.values()
+        return only
+
+    def __repr__(self) -> str:
+        return f"<SweepResult {self.plan.name}: {len(self.table)} runs in {self.out}>"
+
+
+class ComparisonResult(BatchResult):
+    """Results of a comparison of laws on the same layouts."""
+
+    @property
+    def scenarios(self) -> dict[str, Summary]:
+        """Runs, cells and pairs of each scenario, by the scenario's name."""
+        return self.batch.summaries
+
+    @property
+    def pooled(self) -> list[Pair]:
+        """Pairs of values of a field, over all scenarios together."""
+        return self.batch.pooled
+
+    def __repr__(self) -> str:
+        return f"<ComparisonResult {', '.join(self.scenarios)} in {self.out}>"
+
+
+Found = TypeVar("Found", bound=BatchResult)
+
+
+def sweep(
+    plan: SweepPlan | str | Path,
+    out: str | Path | None = None,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> SweepResult:
+    """Runs many variants of a scenario, from a grid of values and from random draws.
+
+    Args:
+        plan: Plan of the sweep, or its YAML file (docs/compare.md).
+        out: New or empty directory. None means the next number under ``results``.
+        workers: Number of local processes. None means one process per processor core.
+        scheduler: Address of a Dask scheduler, which then replaces the local processes.
+        resume: Whether ``out`` may contain runs of the same plan. These runs are kept.
+        progress: Function that is called with the number of finished runs.
+
+    Returns:
+        Table of the runs. The directory contains it, and an HTML page.
+
+    Raises:
+        InputError: An argument or the plan is not valid. The message states the fault
+            and the remedy.
+        RunError: Every run failed.
+    """
+    plan = plan if isinstance(plan, SweepPlan) else load_sweep(plan)
+    prepared = prepare_sweep(
+        plan, out, workers=workers, scheduler=scheduler, resume=resume
+    )
+    return _finish(prepared, progress)
+
+
+def prepare_sweep(
+    plan: SweepPlan,
+    out: str | Path | None,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+) -> Prepared[SweepResult]:
+    """Draws and checks the runs, and opens their directory; see ``sweep``."""
+    batch = prepare_batch(
+        plan, out, workers=workers, scheduler=scheduler, resume=resume
+    )
+    return _prepared(batch, SweepResult)
+
+
+def compare(
+    *scenarios: str | Path,
+    laws: str | Iterable[str] | None = None,
+    runs: int = 50,
+    seed: int = 1,
+    settings: Mapping[str, Any] | None = None,
+    grid: Mapping[str, Sequence[Any]] | None = None,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    resume: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> ComparisonResult:
+    """Compares control laws on the same random layouts.
+
+    A layout is one random variant of the positions and motions of all bodies.
+
+    Args:
+        *scenarios: Names of scenarios in the library, YAML files of layouts, or YAML
+            files of scenarios. If none are given, the four experiments of the papers
+            are run.
+        laws: Names of the laws, as a list or as one text with commas. None means the
+            laws of the papers and driving without avoidance. For a scenario with
+            routes, None means the laws for routes.
+        runs: Number of layouts per scenario. Every law meets each layout.
+        seed: Seed of the layouts and the noise.
+        settings: Values of other fields of the scenarios, by dotted path.
+        grid: Lists of values of other fields to compare, by dotted path.
+        out: New or empty directory. None means the next number under ``results``.
+        workers: Number of processes. None means one process per processor core.
+        resume: Whether ``out`` may contain runs of the same comparison. These runs are
+            kept.
+        progress: Function that is called with the number of finished runs.
+
+    Returns:
+        Rates, medians and pairs of laws. The directory also contains them, with
+        pictures.
+
+    Raises:
+        InputError: An argument is not valid. The message states the fault and the
+            remedy.
+        RunError: Every run failed.
+    """
+    chosen = laws.split(",") if isinstance(laws, str) else laws
+    plans = {
+        Path(each).stem: comparison_plan(
+            str(each),
+            laws=chosen,
+            runs=runs,
+            seed=seed,
+            settings=dict(settings or {}),
+            grid=grid,
+        )
+        for each in scenarios or EXPERIMENTS
+    }
+    if len(plans) < len(scenarios):
+        raise InputError("scenarios", "a name is listed twice; remove one")
+    prepared = prepare_compare(plans, out, workers=workers, resume=resume)
+    return _finish(prepared, progress)
+
+
+def prepare_compare(
+    plans: Mapping[str, SweepPlan],
+    out: str | Path | None,
+    *,
+    workers: int | None = None,
+    resume: bool = False,
+) -> Prepared[ComparisonResult]:
+    """Draws and checks the runs, and opens their directory; see ``compare``."""
+    batch = prepare_comparison(plans, out, workers=workers, resume=resume)
+    return _prepared(batch, ComparisonResult)
+
+
+def _prepared(batch: PreparedBatch, kind: type[Found]) -> Prepared[Found]:
+    return Prepared(
+        run=lambda progress: kind(batch.run(progress)),
+        total=batch.runs,
+        unit="runs",
+        done=batch.done,
+        left=lambda: (
+            f"{batch.done} of {batch.runs} runs are kept: continue with --out "
+            f"{batch.out} --resume"
+        ),
+    )
+
+
+def _finish(prepared: Prepared[Found], progress: Callable[[int], None] | None) -> Found:
+    result = prepared.run(progress or ignore)
+    result.write(result.document(), result.out)
+    return result

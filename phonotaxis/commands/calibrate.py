@@ -1,0 +1,54 @@
+"""``phonotaxis calibrate``: microphone positions from sounds at known positions."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from phonotaxis.commands.arguments import say, take_json
+from phonotaxis.commands.command import Command, Take
+
+if TYPE_CHECKING:
+    from phonotaxis.recordings import CalibrationResult
+    from phonotaxis.result import Prepared
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "sounds",
+        metavar="SOUNDS.yaml",
+        help="recordings, and the positions of their sources",
+    )
+    parser.add_argument(
+        "--geometry", metavar="FILE.yaml", help="stated positions of the microphones"
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="directory for array.yaml and calibration.json"
+    )
+    take_json(parser)
+
+
+def _prepare(options: Namespace, take: Take) -> Prepared[CalibrationResult]:
+    from analysis.calibration.calibration_sounds import load_calibration_sounds
+    from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
+
+    sounds = load_calibration_sounds(options.sounds)
+    given = options.geometry
+    geometry = load_geometry(given) if given else ArrayGeometry()
+    if options.out is not None:
+        take(options.out)
+    say(f"calibrating by {options.sounds}")
+
+    from phonotaxis.recordings import prepare_calibration
+
+    return prepare_calibration(sounds, geometry)
+
+
+COMMAND = Command(
+    "calibrate",
+    "positions of microphones from sounds at known positions",
+    _add_arguments,
+    _prepare,
+    where="geometry in {out}/array.yaml",
+    examples=("calibrate sounds.yaml --out results/calibrated",),
+)

@@ -1,0 +1,63 @@
+"""The progress bar of a command."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, NoReturn
+
+from phonotaxis.commands.interrupts import Interrupts
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
+
+
+class Progress:
+    """Shows a progress bar on a terminal, and nothing if standard error is a pipe.
+
+    Interrupts wait between the calls of this object. Each call lets a waiting interrupt
+    stop the command.
+
+    Args:
+        interrupts: Handler of Ctrl-C and SIGTERM.
+        total: Total amount of work, in ``unit``. If 0, there is no bar.
+        unit: Unit of the work, for example runs.
+        done: Amount of work that was done before the bar starts, in ``unit``.
+    """
+
+    def __init__(
+        self, interrupts: Interrupts, total: float, unit: str, done: float = 0.0
+    ) -> None:
+        self._interrupts = interrupts
+        self._bar: tqdm[NoReturn] | None = None
+        if total and sys.stderr.isatty():
+            from tqdm import tqdm
+
+            left = "{remaining} left"
+            form = f"{{l_bar}}{{bar}}| {{n:.0f}}/{{total:.0f}} {unit}, {left}"
+            self._bar = tqdm(total=total, initial=done, bar_format=form, leave=False)
+        self._steps = 0
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def __call__(self, done: float | str) -> None:
+        """Shows how much work is done.
+
+        Args:
+            done: Amount of finished work, in the unit of the bar. Or the name of the
+                next step, which counts the previous step as done.
+
+        Raises:
+            KeyboardInterrupt: An interrupt came since the last call.
+        """
+        if isinstance(done, str):
+            if self._bar is not None:
+                self._bar.set_description(done)
+            done, self._steps = self._steps, self._steps + 1
+        if self._bar is not None:
+            self._bar.update(done - self._bar.n)
+        self._interrupts.check()

@@ -1,0 +1,134 @@
+"""``phonotaxis simulate``: runs a scenario."""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from phonotaxis.commands.arguments import (
+    LAW_HELP,
+    LAW_WORDS,
+    completed_by,
+    overrides,
+    require_exports,
+    say,
+    take_exports,
+    take_output,
+    take_scenario,
+)
+from phonotaxis.commands.command import Command, Place, Take
+
+if TYPE_CHECKING:
+    from phonotaxis.result import Prepared
+    from phonotaxis.runs import RunResult
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    sound = parser.add_argument("--sound", metavar="FILE", help="sound file to play")
+    completed_by(sound, "file")
+    completed_by(parser.add_argument("--law", help=LAW_HELP), LAW_WORDS)
+    take_scenario(parser)
+    parser.add_argument(
+        "--save-audio",
+        metavar="DIR",
+        help="new directory for the sound that robots hear and loudspeakers play",
+    )
+    take_exports(parser)
+    parser.add_argument(
+        "--movie",
+        metavar="FILE",
+        help="new .gif or .mp4 of the run from above; an .mp4 has the sound at the "
+        "microphones, and needs ffmpeg",
+    )
+    parser.add_argument(
+        "--no-plots",
+        action="store_true",
+        help="write no pictures: only the replay and the numbers",
+    )
+    take_output(parser)
+
+
+def _prepare(options: Namespace, take: Take) -> Prepared[RunResult]:
+    from analysis.run_error import RunError
+    from diagrams.scenario.loading import load_scenario
+    from diagrams.scenario.scenario_files import check_files
+    from phonotaxis.run_files import SavedAudio, SavedMovie
+    from systems.framework.input_error import InputError
+
+    place = take(options.out)
+    require_exports(options)
+    scenario = load_scenario(options.scenario, _settings(options))
+    check_files(scenario)
+    saved: SavedAudio | None = None
+    if options.save_audio is not None:
+        saved = SavedAudio(options.save_audio, scenario)
+        _require_outside(place, "save_audio", options.save_audio, saved.path)
+    movie: SavedMovie | None = None
+    if options.movie is not None:
+        movie = SavedMovie(options.movie, scenario)
+        _require_outside(place, "movie", options.movie, movie.path)
+    say(f"simulating {scenario.name}")
+
+    from phonotaxis.runs import prepare_simulation
+
+    prepared = prepare_simulation(scenario, saved=saved, movie=movie)
+
+    def run(progress: Callable[[float], None]) -> RunResult:
+        try:
+            return prepared.run(progress)
+        except InputError as error:  # found after the input had been accepted
+            raise RunError(str(error)) from error
+
+    return replace(prepared, run=run)
+
+
+def _require_outside(place: Place, option: str, given: str, path: Path) -> None:
+    """Rejects a file or directory inside the result directory."""
+    if path.resolve().is_relative_to(place.out.expanduser().resolve()):
+        from systems.framework.input_error import InputError
+
+        raise InputError(
+            option,
+            f"{given} is in the directory of the results, and that directory is "
+            "created at the end; name another directory",
+        )
+
+
+def _write(
+    options: Namespace, result: RunResult, document: dict[str, Any], directory: Path
+) -> None:
+    pictures = not options.no_plots
+    result.write(
+        document, directory, pictures=pictures, mcap=options.mcap, csv=options.csv
+    )
+
+
+def _settings(options: Namespace) -> list[str]:
+    settings = overrides(options)
+    if options.sound is not None:
+        settings += ["sound.kind=wav", f"sound.file={json.dumps(options.sound)}"]
+    if options.law is not None:
+        settings.append(f"law={options.law}")
+    return settings
+
+
+COMMAND = Command(
+    "simulate",
+    "run a scenario",
+    _add_arguments,
+    _prepare,
+    where=f"{'results':<21} {{out}}\n"
+    f"{'replay':<21} {{out}}/replay.html, to be opened in a browser",
+    write=_write,
+    examples=(
+        "simulate",
+        "simulate u_trap --law guarded",
+        "simulate my_scenario.yaml --seed 7 --out results/mine",
+        "simulate --set source.speed_m_s=0.2 --set hearing=ideal --json",
+        "simulate --law my_laws.py:soft --no-plots",
+    ),
+)

@@ -1,0 +1,108 @@
+"""The shape of all results, and of work that is ready to start."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Output", "Prepared", "Result"]
+
+
+class Output(ABC):
+    """What a command prints: a JSON document or text."""
+
+    @abstractmethod
+    def document(self) -> dict[str, Any]:
+        """Returns the JSON document of the command, from plain values."""
+
+    @abstractmethod
+    def __str__(self) -> str:
+        """Returns the text that the command prints, without a final newline."""
+
+    def failure(self, out: Path | None) -> Exception | None:
+        """Returns why the command fails although it has a result.
+
+        Args:
+            out: Directory that contains the files; None if there are no files.
+
+        Returns:
+            The exception, whose message the command prints; None if it succeeds.
+        """
+        return None
+
+
+class Result(Output):
+    """Result of a public function."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Warnings and remarks about the result, each in one line."""
+        return ()
+
+    @property
+    def out(self) -> Path | None:
+        """Directory that already contains the files; None before ``save``."""
+        return None
+
+    @abstractmethod
+    def plot(self) -> Figure | dict[str, Figure]:
+        """Draws the result: one figure, or several figures by name."""
+
+    @abstractmethod
+    def write(self, document: dict[str, Any], directory: Path) -> None:
+        """Writes the files of the command into an existing directory.
+
+        Args:
+            document: The JSON document, with the key ``out``.
+            directory: Existing directory.
+        """
+
+    def save(self, directory: str | Path | None = None) -> Path:
+        """Writes all files of the command into a new directory.
+
+        Args:
+            directory: New or empty directory. None means the next number under
+                ``results``.
+
+        Returns:
+            Path of the directory.
+
+        Raises:
+            InputError: The directory is in use, or cannot be created or written.
+        """
+        from analysis.reporting.result_directory import whole_directory
+
+        with whole_directory(directory) as (shown, partial):
+            self.write({**self.document(), "out": str(shown)}, partial)
+        return shown
+
+
+Output_co = TypeVar("Output_co", bound=Output, covariant=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prepared(Generic[Output_co]):
+    """Work whose input has been checked, and which can be done once."""
+
+    run: Callable[[Callable[[Any], None]], Output_co]
+    """Does the work. The argument is a function that is called with the amount of
+    finished work in ``unit``, or with the name of the next step. If it raises an
+    exception, the work ends."""
+    total: float = 0.0
+    """Total amount of work; 0 if ``run`` does not report its progress."""
+    unit: str = ""
+    """Unit of the work, for example runs."""
+    done: float = 0.0
+    """Amount of work that was done before."""
+    left: Callable[[], str] = str
+    """Describes the files that remain after an interrupt; empty if there are none."""
+
+
+def ignore(done: Any) -> None:
+    """Reports no progress."""

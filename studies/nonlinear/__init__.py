@@ -1,0 +1,1 @@
+"""Motion straight toward an obstacle, and the places where the robot stops."""

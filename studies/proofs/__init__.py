@@ -1,0 +1,1 @@
+"""Regions that are proved to be safe, and bounds on the effect of moving bodies."""
