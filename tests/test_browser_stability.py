@@ -11,7 +11,7 @@ import pytest
 from matplotlib.image import imread
 
 from analysis.stability.law_analysis import analyse_law
-from analysis.stability.report_page import stability_page
+from analysis.stability.report_files import stability_page
 from analysis.stability.report_parts import SOUND_PARTS
 from diagrams import load_scenario
 

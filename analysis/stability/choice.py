@@ -10,20 +10,13 @@ from systems.laws.catalogue import FORCE_LAWS, LAWS, ROUTE_LAWS
 
 
 def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...]:
-    """Returns one copy of a scenario for each chosen law.
+    """Returns one copy of a scenario for each chosen law, in the order of the names.
 
-    Args:
-        scenario: The scenario with the robot that is analyzed.
-        names: Names of the chosen laws. The name ``all`` means all force laws except
-            ``none``. For a robot on a route, ``all`` means all laws for routes. For a
-            robot that searches, ``all`` means the law of the scenario. If there are no
-            names, the law of the scenario is chosen.
-
-    Returns:
-        The copies, in the order of the names. A law that is named twice has one copy.
-
-    Raises:
-        InputError: A law does not exist, or it cannot be analyzed for this robot.
+    The name ``all`` means all force laws except ``none``. For a robot on a route,
+    ``all`` means all laws for routes. For a robot that searches, ``all`` means the law
+    of the scenario. If there are no names, the law of the scenario is chosen. A law
+    that is named twice has one copy. The function raises an InputError if a law does
+    not exist, or if it cannot be analyzed for this robot.
     """
     routed = scenario.only.kind == "router"
     every = list(ROUTE_LAWS if routed else FORCE_LAWS)
@@ -35,8 +28,7 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
     for law in laws or [scenario.only.law]:
         if routed and law not in every:
             raise InputError(
-                "law",
-                f"is {law!r}, but the robot has a route; use {', '.join(every)}",
+                "law", f"is {law!r}, but the robot has a route; use {', '.join(every)}"
             )
         if scenario.only.searches is not None:
             if law != scenario.only.law:
@@ -60,18 +52,11 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
 
 
 def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
-    """Returns a scenario that contains only one robot and the source that it follows.
+    """Returns a scenario with only one robot, and a text that lists the other robots.
 
-    Args:
-        scenario: A scenario with any number of robots.
-        name: Name of the robot that is analyzed. None means the first robot.
-
-    Returns:
-        The first value is the scenario without the other robots. The second value is a
-        text that lists the other robots. It is empty if there are no other robots.
-
-    Raises:
-        InputError: The scenario has no robot with this name.
+    The scenario also contains the source that the robot follows. Without a name, the
+    first robot is chosen. The text is empty if there are no other robots. The function
+    raises an InputError if the scenario has no robot with this name.
     """
     names = list(scenario.robots)
     if name is not None and name not in names:

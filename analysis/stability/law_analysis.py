@@ -143,22 +143,13 @@ def analyse_law(
     full: bool = False,
     step: Callable[[str], None] = lambda title: None,
 ) -> LawAnalysis:
-    """Runs the parts of the stability analysis for the law of a scenario.
+    """Runs the parts of the stability analysis for the law of a scenario, in order.
 
-    Args:
-        scenario: The scenario with the law. The sensors may be exact or realistic,
-            because each part chooses its own sensors.
-        parts: The parts, in the order in which they run.
-        full: Whether checks by simulation take longer, see ``Study``.
-        step: Function that is called with the title of each part before the part runs.
-
-    Returns:
-        The analysis, with one section per part. If a part has no result, its section
-        states the reason.
-
-    Raises:
-        InputError: The first part has no result. All other parts depend on this part.
-            If the first part raises another exception, this exception is also raised.
+    The sensors may be exact or realistic, because each part chooses its own sensors.
+    ``full`` is explained in ``Study``. ``step`` is called with the title of each
+    part before the part runs. If a part has no result, its section states the reason.
+    All parts depend on the first part; therefore every exception of the first part is
+    raised.
     """
     analysis = LawAnalysis(scenario, model_sheet(scenario))
     study = Study(scenario, full, analysis.found)

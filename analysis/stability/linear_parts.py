@@ -56,11 +56,9 @@ class OperatingPoints:
 
     search: EquilibriumSearch
     at: OperatingPoint
-    """Stable equilibrium about which the loop is linearized.
-    ``EquilibriumSearch.follow_point`` chooses this equilibrium."""
+    """Stable equilibrium of the models, from ``EquilibriumSearch.follow_point``."""
     moving: OperatingPoint | None
-    """The equilibrium of a robot behind a source that moves at constant velocity. None
-    if there is no such equilibrium."""
+    """Equilibrium behind a source that moves at constant velocity, if there is one."""
     no_moving: str
     """Reason why ``moving`` is None. Empty if ``moving`` exists."""
     jams: int

@@ -1,4 +1,4 @@
-"""Part of the stability report about the stability margins of the loops."""
+"""Parts of the stability report about stability margins, and about gains for them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.design.attraction_search import (
+    GainFigures,
+    RecommendedGains,
+    recommend_gains,
+)
 from analysis.design.requirements import REQUIRED
 from analysis.linear.gang_of_four import GangOfFour, gang_of_four
+from analysis.linear.heading_loop import HeadingLoopMargins, heading_loop_margins
 from analysis.linear.linear_plots import (
     plot_bode,
     plot_gang_of_four,
@@ -32,7 +38,7 @@ from analysis.models.operating_points import OperatingPoint
 from analysis.reporting.criterion import Criterion, Reading
 from analysis.reporting.plain_values import pick
 from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
-from analysis.stability.law_analysis import Part, Study
+from analysis.stability.law_analysis import Data, Part, Study
 
 #: Explanation of the margins for readers of the report.
 _EXPLANATION = (
@@ -57,6 +63,8 @@ _COLUMNS = {
     "complementary_peak": Column("M_t"),
     "delay_margin_s": Column("delay", "s"),
 }
+#: Source of the usual phase margin and gain margin.
+_USUAL = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
 #: Place and direction of the cut loop that represents the implemented loop.
 _MAIN = ("sensor", "along")
 
@@ -223,15 +231,48 @@ def _db(factor: float) -> str:
     return number(20.0 * math.log10(factor) if factor > 0.0 else -math.inf, 3)
 
 
-def _worst(
-    worst: Callable[[list[float]], float], of: Callable[[LoopMargins], float]
-) -> Callable[[Margins], Reading]:
-    """Reads the worst value over all places of the cut and both directions."""
-    return lambda data: (
-        worst([of(each.margins) for each in data.implemented])
-        if data.implemented
-        else math.nan
-    )
+def margin_criteria(
+    loops: Callable[[Data], Sequence[LoopMargins]],
+) -> tuple[Criterion[Data], ...]:
+    """Returns the criteria for the worst margins over all cuts of a loop."""
+
+    def worst(
+        choose: Callable[[list[float]], float], name: str
+    ) -> Callable[[Data], Reading]:
+        def read(data: Data) -> Reading:
+            values = [getattr(margins, name) for margins in loops(data)]
+            return choose(values) if values else math.nan
+
+        return read
+
+    return (
+        Criterion(
+            "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
+            "every cut loop tolerates the usual extra phase lag or lead",
+            "a small extra phase makes the loop oscillate",
+            _USUAL,
+            worst(min, "phase_margin_deg"),
+        ),
+        Criterion(
+            "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
+            "gains may double, or fall to half",
+            "a gain that is off by less than a factor of two, up or down, makes it "
+            "unstable",
+            _USUAL,
+            worst(min, "gain_margin_db"),
+        ),
+        Criterion(
+            "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
+            "disturbances are hardly amplified",
+            "disturbances near the crossover are amplified more than twice",
+            "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",
+            worst(max, "sensitivity_peak"),
+        ),
+    )  # fmt: skip
+
+
+def _all_cuts(data: Margins) -> list[LoopMargins]:
+    return [each.margins for each in data.implemented]
 
 
 MARGINS = Part[Margins](
@@ -240,37 +281,136 @@ MARGINS = Part[Margins](
     _margins,
     _show,
     criteria=(
-        Criterion(
-            "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
-            "every cut loop tolerates the usual extra phase lag or lead",
-            "a small extra phase makes the loop oscillate",
-            "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
-            _worst(min, lambda margins: margins.phase_margin_deg),
-        ),
-        Criterion(
-            "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
-            "gains may double, or fall to half",
-            "a gain that is off by less than a factor of two, up or down, makes it "
-            "unstable",
-            "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
-            _worst(min, lambda margins: margins.gain_margin_db),
-        ),
-        Criterion(
-            "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
-            "disturbances are hardly amplified",
-            "disturbances near the crossover are amplified more than twice",
-            "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",
-            _worst(max, lambda margins: margins.sensitivity_peak),
-        ),
+        *margin_criteria(_all_cuts),
         Criterion(
             "least disk margin", "", "at least", REQUIRED.disk_margin,
             "gain and phase may change at once, by 6 dB and 37 deg",
             "a change of gain and phase at once makes the loop oscillate early",
             "alpha = 2/3: 6 dB in each direction (Seiler, Packard and Gahinet 2020)",
-            _worst(min, lambda margins: margins.disk.alpha),
+            lambda data: min((m.disk.alpha for m in _all_cuts(data)), default=math.nan),
         ),
     ),
     document=_document,
     models=lambda data: (data.target_model,),
     fresh=True,
+)  # fmt: skip
+
+
+def _show_gains(data: RecommendedGains) -> list[Content]:
+    t, today = data.requirements, data.today
+    columns: list[Column | str] = [
+        "K_r", "D_r", "damping ratio", Column("phase", "deg"), Column("gain", "dB"),
+        "M_s", "disk", Column("delay", "s"), Column("lag", "m"), Column("to 2 %", "s"),
+        Column("stiffest law", "N/m"),
+    ]  # fmt: skip
+    rows: list[list[Cell]] = [
+        ["Current gains"],
+        _figures(today),
+        ["Least D_r that meets all requirements"],
+    ]
+    rows += [
+        _figures(choice.figures)
+        if choice.figures
+        else [choice.stiffness_n_m, "none", *([None] * 9)]
+        for choice in data.choices
+    ]
+    return [
+        (
+            f"The requirements are a damping ratio of {t.damping_ratio:g}, a phase "
+            f"margin of {t.phase_margin_deg:g} deg, a gain margin of "
+            f"{t.gain_margin_db:g} dB, M_s of {t.sensitivity_peak:g}, a disk margin of "
+            f"{t.disk_margin:.2f}, a delay margin of {t.delay_margin_s:g} s, at sensor "
+            "and actuator, and rest before an obstacle with echoes that are "
+            f"{t.spare_latency_ticks} tick late. The loop is the sampled loop of the "
+            "attraction with motor lag; margins are the least in both directions. The "
+            "lag is the distance of P behind the follow point of a source that moves "
+            "like the source of this scenario. The stiffest law is the largest spring "
+            "to obstacles with which P comes to rest."
+        ),
+        Table(columns, rows),
+        data.advice,
+    ]
+
+
+def _figures(f: GainFigures) -> list[Cell]:
+    return [
+        f.stiffness_n_m, f.damping_n_s_m, f.damping_ratio, f.phase_margin_deg,
+        f.gain_margin_db, f.sensitivity_peak, f.disk_margin, f.delay_margin_s,
+        f.following_lag_m, f.settling_s, f.largest_law_stiffness_n_m,
+    ]  # fmt: skip
+
+
+RECOMMENDED_GAINS = Part[RecommendedGains](
+    "recommended_gains",
+    "Recommended gains",
+    lambda study: recommend_gains(study.scenario),
+    _show_gains,
+)
+
+
+def _heading_loop(study: Study) -> HeadingLoopMargins:
+    scenario = study.scenario
+    return heading_loop_margins(
+        scenario.searcher.motor_driver,
+        scenario.only.robot,
+        scenario.only.plant.motor_lag_s,
+        scenario.tick_s,
+    )
+
+
+def _show_heading(data: HeadingLoopMargins) -> list[Content]:
+    return [
+        (
+            "A searching robot stops, decides on a heading, and turns to it while it "
+            "drives. The loop has a compass, a PID controller, pulse widths, motors "
+            "and the heading that the wheels produce; PID output and motor duties are "
+            "held over a tick. The loop is cut at the deviation of the heading. It is "
+            "linear for deviations within L and within all limits; with a larger "
+            "deviation the robot turns on the spot, more slowly than the linear loop "
+            "would. Linear models do not cover steps, phases and finds: "
+            "docs/searches.md states how often each occurs."
+        ),
+        Table.of(
+            [data],
+            {
+                Column("crossover", "rad/s"): "crossover_rad_s",
+                Column("phase margin", "deg"): "phase_margin_deg",
+                Column("delay margin", "s"): "delay_margin_s",
+                Column("delay margin", "ticks"): "delay_margin_ticks",
+                Column("gain margin", "dB"): "gain_margin_db",
+                Column("lost by sampling", "deg"): "phase_lost_deg",
+            },
+            f"With a tick of {number(1e3 * data.tick_s)} ms",
+        ),
+    ]
+
+
+HEADING_LOOP = Part[HeadingLoopMargins](
+    "heading_loop",
+    "The loop of the heading",
+    _heading_loop,
+    _show_heading,
+    criteria=(
+        Criterion(
+            "phase margin of the heading", "deg", "at least", 45.0,
+            "it turns to its heading without swinging",
+            "it swings about its heading",
+            _USUAL,
+            lambda data: data.phase_margin_deg,
+        ),
+        Criterion(
+            "gain margin of the heading", "dB", "at least", 6.0,
+            "the motors may be twice as strong",
+            "motors of less than twice the nominal strength make it unstable",
+            _USUAL,
+            lambda data: data.gain_margin_db,
+        ),
+        Criterion(
+            "delay margin of the heading", "ticks", "at least", 4.0,
+            "it tolerates more added ticks of delay than the threshold",
+            "fewer added ticks of delay than the threshold make it oscillate",
+            "set by this project",
+            lambda data: data.delay_margin_ticks,
+        ),
+    ),
 )  # fmt: skip

@@ -25,20 +25,8 @@ from systems.laws.parameters import ImpedanceParameters
 _PARTS = {
     "follower": ("attraction", "collision_vector", "robot", "plant", "tracker"),
     "router": ("robot", "plant", "route", "objects"),
-    "odor_searcher": (
-        "robot",
-        "plant",
-        "compass",
-        "motor_driver",
-        "search",
-    ),
-    "sound_searcher": (
-        "robot",
-        "plant",
-        "compass",
-        "motor_driver",
-        "sound_search",
-    ),
+    "odor_searcher": ("robot", "plant", "compass", "motor_driver", "search"),
+    "sound_searcher": ("robot", "plant", "compass", "motor_driver", "sound_search"),
 }
 #: Fields of these parts that do not affect the loop.
 _OTHERS = frozenset(
@@ -173,14 +161,7 @@ class ModelSheet:
         return tuple(dict.fromkeys(row.path for row in self.latencies))
 
     def latency_s(self, path: str) -> float:
-        """Returns the sum of the mean delays from one measured quantity to the wheels.
-
-        Args:
-            path: One of ``paths``.
-
-        Returns:
-            The sum in s.
-        """
+        """Returns the sum of the mean delays from one of ``paths`` to the wheels, s."""
         return sum(row.mean_s for row in self.latencies if row.path == path)
 
 
@@ -193,7 +174,10 @@ def model_sheet(scenario: Scenario) -> ModelSheet:
     latencies: tuple[Latency, ...]
     if scenario.only.searches is not None:
         motion = _SEARCH_MOTION
-        envelope, latencies = _search_envelope(scenario), _search_latencies(scenario)
+        envelope, latencies = (
+            _search_envelope(scenario),
+            _drive_latencies(scenario, "heading"),
+        )
         assumptions = _SEARCH_ASSUMPTIONS
     elif routed:
         motion, assumptions = _route_motion(scenario.tick_s), _ROUTE_ASSUMPTIONS
@@ -276,14 +260,11 @@ def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
 
 
 def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
-    tick = scenario.tick_s
-    half, frame = tick / 2.0, f"middle of a {tick * 1e3:g} ms frame"
-    sound, lag = scenario.source.sound, scenario.only.plant.motor_lag_s
+    tick, sound = scenario.tick_s, scenario.source.sound
+    frame = f"middle of a {tick * 1e3:g} ms frame"
     silent = max(sound.period_s - sound.on_s, 0.0)
-    hold = Latency("source", "velocity held for one tick", half, "WheelCommand")
-    motor = Latency("source", "motor lag", lag, "first order")
     return (
-        Latency("source", "sound collected", half, frame),
+        Latency("source", "sound collected", tick / 2.0, frame),
         Latency("source", "estimate computed", tick, "TDOAEstimator: one tick"),
         Latency(
             "source",
@@ -291,11 +272,19 @@ def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
             silent**2 / (2.0 * sound.period_s),
             f"up to {silent:g} s; 0 while the source sounds; the tracker bridges it",
         ),
-        hold,
-        motor,
+        *_drive_latencies(scenario, "source"),
         Latency("obstacle", "echo measured", 0.0, "travel time is not modeled"),
-        Latency("obstacle", hold.part, hold.mean_s, hold.remark),
-        Latency("obstacle", motor.part, motor.mean_s, motor.remark),
+        *_drive_latencies(scenario, "obstacle"),
+    )
+
+
+def _drive_latencies(scenario: Scenario, path: str) -> tuple[Latency, Latency]:
+    block, held = "WheelCommand", "velocity held for one tick"
+    if scenario.only.searches is not None:
+        block, held = "MotorDriver", "duties held for one tick"
+    return (
+        Latency(path, held, scenario.tick_s / 2.0, block),
+        Latency(path, "motor lag", scenario.only.plant.motor_lag_s, "first order"),
     )
 
 
@@ -336,14 +325,6 @@ def _search_envelope(scenario: Scenario) -> tuple[Limit, ...]:
     )
 
 
-def _search_latencies(scenario: Scenario) -> tuple[Latency, ...]:
-    held = scenario.tick_s / 2.0
-    return (
-        Latency("heading", "duties held for one tick", held, "MotorDriver"),
-        Latency("heading", "motor lag", scenario.only.plant.motor_lag_s, "first order"),
-    )
-
-
 def _route_envelope(scenario: Scenario) -> tuple[Limit, ...]:
     robot, target = scenario.only.robot, scenario.router.route
     return (
@@ -355,22 +336,12 @@ def _route_envelope(scenario: Scenario) -> tuple[Limit, ...]:
 
 
 def _route_latencies(scenario: Scenario) -> tuple[Latency, ...]:
-    seen = Latency(
-        "obstacle",
-        "objects seen",
-        scenario.router.objects.latency_s,
-        "objects.latency_s",
+    latency_s = scenario.router.objects.latency_s
+    return (
+        *_drive_latencies(scenario, "target"),
+        Latency("obstacle", "objects seen", latency_s, "objects.latency_s"),
+        *_drive_latencies(scenario, "obstacle"),
     )
-    held = scenario.tick_s / 2.0
-    rows = [
-        row
-        for path in ("target", "obstacle")
-        for row in (
-            Latency(path, "velocity held for one tick", held, "WheelCommand"),
-            Latency(path, "motor lag", scenario.only.plant.motor_lag_s, "first order"),
-        )
-    ]
-    return (*rows[:2], seen, *rows[2:])
 
 
 def _route_motion(tick_s: float) -> tuple[Equation, ...]:

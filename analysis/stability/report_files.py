@@ -1,24 +1,42 @@
-"""The stability analysis as a JSON document, as text, and as files."""
+"""Writes a stability analysis as a JSON document, as text, and as an HTML page."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from analysis.models.model_export import write_models
-from analysis.reporting.criterion import compare_verdicts
+from analysis.reporting.criterion import Verdict, compare_verdicts, shown_value
 from analysis.reporting.plain_values import plain
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
-from analysis.reporting.render import text
-from analysis.reporting.section import Table, figures_of
+from analysis.reporting.render import html, page, text
+from analysis.reporting.section import (
+    Bullets,
+    Cell,
+    Column,
+    Content,
+    Definitions,
+    Formula,
+    Judged,
+    Links,
+    Note,
+    Section,
+    Table,
+    figures_of,
+    number,
+)
 from analysis.stability.law_analysis import LawAnalysis
-from analysis.stability.report_page import stability_page, verdict_table
+from analysis.stability.model_sheet import ModelSheet, ParameterRow
 from diagrams import write_scenario
+from systems.laws.catalogue import law_title
+from systems.laws.law import Equation
 
 
 def stability_document(analyses: Sequence[LawAnalysis]) -> dict[str, Any]:
@@ -80,17 +98,12 @@ def report_figures(analyses: Sequence[LawAnalysis]) -> dict[str, Figure]:
 def write_stability(
     analyses: Sequence[LawAnalysis], document: dict[str, Any], directory: Path
 ) -> None:
-    """Writes the files of a stability analysis into a directory.
+    """Writes the files of a stability analysis into an existing directory.
 
     - ``report.html`` is the report.
-    - ``summary.json`` is the JSON document.
+    - ``summary.json`` is the JSON document from ``stability_document``.
     - ``scenario.yaml`` is the scenario.
     - ``models.mat`` and ``models/*.csv`` are the linear models.
-
-    Args:
-        analyses: One analysis per law, all of the same scenario.
-        document: The JSON document from ``stability_document``.
-        directory: An existing directory.
     """
     models = [
         replace(model, name=f"{analysis.law} {model.name}")
@@ -102,3 +115,162 @@ def write_stability(
     write_scenario(scenario, directory)
     (directory / "summary.json").write_text(json.dumps(document) + "\n")
     (directory / "report.html").write_text(stability_page(analyses), "utf-8")
+
+
+def stability_page(analyses: Sequence[LawAnalysis]) -> str:
+    """Returns the complete stability report as one HTML page."""
+    first = analyses[0].scenario
+    laws = ", ".join(law_title(a.law).lower() for a in analyses)
+    sections = [
+        _summary(analyses),
+        _model(analyses[0].sheet),
+        *(_law(analysis, f"law{k}") for k, analysis in enumerate(analyses)),
+    ]
+    return page(
+        f"Stability of {first.name}: {laws}",
+        [(each.key, each.title) for each in sections],
+        [html(each, each.key) for each in sections],
+    )
+
+
+def verdict_table(analyses: Sequence[LawAnalysis]) -> Table:
+    """Returns the verdicts of all laws side by side."""
+    laws = [analysis.law for analysis in analyses]
+    rows: list[list[Cell]] = [
+        [
+            row.name,
+            row.threshold,
+            *(
+                Judged(shown_value(row.values[law], row.unit), row.verdicts[law])
+                for law in laws
+            ),
+            row.text,
+        ]
+        for row in compare_verdicts({a.law: a.verdicts for a in analyses})
+    ]
+    return Table(["criterion", "threshold", *laws, "in plain words"], rows)
+
+
+def _summary(analyses: Sequence[LawAnalysis]) -> Section:
+    sheet = analyses[0].sheet
+    notes = [
+        note if len(analyses) == 1 else f"{law_title(analysis.law)}: {note}"
+        for analysis in analyses
+        for note in analysis.notes
+    ]
+    before: list[Content] = ["Before you use the numbers:", Bullets(notes)]
+    contents: list[Content] = [
+        Definitions(
+            [
+                ("Scenario", f"{sheet.scenario}: {sheet.description}"),
+                ("Seed", str(sheet.seed)),
+                ("Versions", ", ".join(f"{k} {v}" for k, v in sheet.versions.items())),
+            ]
+        ),
+        Bullets([_count(analysis) for analysis in analyses]),
+        *(before if notes else []),
+        verdict_table(analyses),
+        *(
+            f"{law_title(a.law)}: {a.found['recommended_gains'].advice}"
+            for a in analyses
+            if "recommended_gains" in a.found
+        ),
+    ]
+    return Section("summary", "Summary", contents)
+
+
+def _count(analysis: LawAnalysis) -> str:
+    found = [verdict.verdict for verdict in analysis.verdicts]
+    return (
+        f"{law_title(analysis.law)}: {found.count('pass')} of "
+        f"{len(found) - found.count('not applicable')} criteria pass."
+    )
+
+
+def _law(analysis: LawAnalysis, anchor: str) -> Section:
+    sheet = analysis.sheet
+    sections = [*analysis.sections, _verdicts(analysis.verdicts)]
+    contents: list[Content] = [
+        Links((f"{anchor}-{each.key}", each.title) for each in sections),
+        *_equations(sheet.law_equations),
+        _parameter_table([row for row in sheet.parameters if row.of_law]),
+        f"SHA-256 of the effective scenario: `{sheet.scenario_sha256}`.",
+        *(_drawn(analysis, each, f"{anchor}-{each.key}") for each in sections),
+    ]
+    return Section(anchor, law_title(analysis.law), contents, fresh=True)
+
+
+def _drawn(analysis: LawAnalysis, section: Section, anchor: str) -> Markup:
+    """Returns a section as HTML; a figure that fails leaves the other sections."""
+    try:
+        return html(section, anchor, level=3)
+    except Exception as error:  # noqa: BLE001  # the other sections must be shown
+        failed = Note(f"This part failed: {analysis.fail(section.key, error)}.")
+        return html(Section(section.key, section.title, [failed]), anchor, level=3)
+
+
+def _verdicts(verdicts: Sequence[Verdict]) -> Section:
+    table = Table.of(
+        verdicts,
+        {
+            "criterion": "name",
+            "value": lambda verdict: shown_value(verdict.value, verdict.unit),
+            "threshold": "threshold",
+            "verdict": "verdict",
+            "in plain words": "text",
+            "source": "source",
+        },
+    )
+    return Section("verdicts", "Verdicts", [table], fresh=True)
+
+
+def _model(sheet: ModelSheet) -> Section:
+    """Returns the section with the model sheet, which holds for every law."""
+    latencies: list[list[Cell]] = []
+    for path in sheet.paths:
+        latencies.append([f"From {path} to wheels: {1e3 * sheet.latency_s(path):g} ms"])
+        latencies += [
+            [x.part, 1e3 * x.mean_s, x.remark]
+            for x in sheet.latencies
+            if x.path == path
+        ]
+    contents: list[Content] = [
+        *_equations(sheet.motion),
+        Bullets(sheet.assumptions),
+        _parameter_table([row for row in sheet.parameters if not row.of_law]),
+        Table(
+            ["limit", "value", "unit", "remark"],
+            [(x.quantity, x.value, x.unit, x.remark) for x in sheet.envelope],
+            "Operating envelope",
+        ),
+        Table(["part", Column("mean", "ms"), "remark"], latencies, "Latency budget"),
+    ]
+    return Section("model", "Model sheet", contents, fresh=True)
+
+
+def _equations(formulas: Sequence[Equation]) -> list[Content]:
+    return [
+        content
+        for formula in formulas
+        for content in (f"{formula.title}:", Formula(formula.tex, formula.text))
+    ]
+
+
+def _parameter_table(parameters: Sequence[ParameterRow]) -> Table:
+    rows: list[list[Cell]] = []
+    for part, group in groupby(parameters, key=lambda row: row.part):
+        rows.append([part])
+        rows += [
+            [f"`{row.field}`", _shown(row.value, changed=row.changed), row.text]
+            for row in group
+        ]
+    return Table(
+        ["parameter", "value", "meaning, unit, source"],
+        rows,
+        "Parameters; an asterisk marks a value that is not the default",
+    )
+
+
+def _shown(value: Any, *, changed: bool) -> str:
+    shown = number(value) if isinstance(value, float) else str(value)
+    return f"{shown} *" if changed else shown

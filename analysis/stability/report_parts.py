@@ -7,10 +7,9 @@ from typing import Any
 
 from analysis.reporting.section import Bullets
 from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANCE
-from analysis.stability.gain_parts import RECOMMENDED_GAINS
 from analysis.stability.law_analysis import Part
 from analysis.stability.linear_parts import LINEAR_MODELS, OPERATING_POINTS, STEP
-from analysis.stability.margin_parts import MARGINS
+from analysis.stability.margin_parts import HEADING_LOOP, MARGINS, RECOMMENDED_GAINS
 from analysis.stability.robustness_parts import CONTACT_ROBUSTNESS, ROBUSTNESS
 from analysis.stability.route_parts import (
     ADAPTATION,
@@ -24,7 +23,6 @@ from analysis.stability.sampling_parts import (
     CONTACT_MODE,
     DELAY_MARGINS,
 )
-from analysis.stability.search_parts import HEADING_LOOP
 from diagrams import Scenario
 
 #: Parts for a robot that follows a sound. The first part is about operating points,

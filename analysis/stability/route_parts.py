@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from analysis.design.requirements import REQUIRED
 from analysis.linear.loop_margins import LoopMargins
 from analysis.reporting.criterion import Criterion, Reading
 from analysis.reporting.plain_values import pick
 from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
 from analysis.stability.law_analysis import Part, Study
+from analysis.stability.margin_parts import margin_criteria
 from analysis.trajectory.adaptation_stability import (
     AdaptationStability,
     adaptation_stability,
@@ -105,13 +105,8 @@ def _poles_of(point: FrozenPoint) -> list[str]:
     return [number(p if abs(p.imag) > 1e-9 else p.real) for p in shown]
 
 
-def _worst(
-    worst: Callable[[list[float]], float], of: Callable[[LoopMargins], float]
-) -> Callable[[Sequence[FrozenPoint]], float]:
-    """Reads the worst value over all operating points and both directions."""
-    return lambda data: worst(
-        [of(margins) for point in data for margins in point.margins.values()]
-    )
+def _all_cuts(data: Sequence[FrozenPoint]) -> list[LoopMargins]:
+    return [margins for point in data for margins in point.margins.values()]
 
 
 FROZEN_GAINS = Part[Sequence[FrozenPoint]](
@@ -143,33 +138,13 @@ FROZEN_GAINS = Part[Sequence[FrozenPoint]](
             "usual: 0.4 to 0.8 (Astrom and Murray)",
             lambda data: min(point.model.damping_ratio for point in data),
         ),
-        Criterion(
-            "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
-            "the loop tolerates the usual extra phase lag or lead",
-            "a small extra phase makes the loop oscillate",
-            "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
-            _worst(min, lambda margins: margins.phase_margin_deg),
-        ),
-        Criterion(
-            "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
-            "gains may double, or fall to half",
-            "a gain that is off by less than a factor of two makes it unstable",
-            "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)",
-            _worst(min, lambda margins: margins.gain_margin_db),
-        ),
-        Criterion(
-            "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
-            "disturbances are hardly amplified",
-            "disturbances near the crossover are amplified more than twice",
-            "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",
-            _worst(max, lambda margins: margins.sensitivity_peak),
-        ),
+        *margin_criteria(_all_cuts),
         Criterion(
             "least delay margin of the loop without sampling", "s", "at least", 0.1,
             "it tolerates more added delay than the threshold",
             "less added delay than the threshold makes it oscillate",
             "set by this project; phase margin divided by crossover frequency",
-            _worst(min, lambda margins: margins.delay_margin_s),
+            lambda data: min(margins.delay_margin_s for margins in _all_cuts(data)),
         ),
     ),
     document=_frozen_document,
@@ -189,11 +164,7 @@ class SpringBounds:
 
     @property
     def share(self) -> float:
-        """Total stiffness relative to its stability limit.
-
-        The limit is for the damping of the target alone and for positions that are one
-        tick late.
-        """
+        """Total stiffness over its limit, for positions that are one tick late."""
         bound = self.bounds.stable_today_n_m[-1]
         return self.total_stiffness_n_m / bound if bound > 0.0 else math.inf
 
@@ -285,9 +256,7 @@ class Adaptation:
 
     stability: AdaptationStability
     jam_share: float
-    """Stiffness at the end of a jam relative to its stability limit. In a jam, a wall
-    holds the robot back while the target moves on. The limit is for the damping of the
-    target alone. NaN if the limit is unknown."""
+    """Stiffness at the end of a jam relative to its stability limit; NaN if unknown."""
 
 
 def _adaptation(study: Study) -> Adaptation:
@@ -352,12 +321,7 @@ def _show_adaptation(data: Adaptation) -> list[Content]:
         )
         + ".",
         Table(
-            [
-                Column("time", "s"),
-                "gradient, closed form",
-                "without limits",
-                "as set",
-            ],
+            [Column("time", "s"), "gradient, closed form", "without limits", "as set"],
             [
                 [float(time), *values]
                 for time, *values in zip(
@@ -391,8 +355,7 @@ def _show_adaptation(data: Adaptation) -> list[Content]:
         if found.bounded
         else "Nothing bounds K and D; set `projected` to bound them.",
         Figure(
-            lambda: plot_adaptation(found),
-            "Lyapunov function, and drift under a push.",
+            lambda: plot_adaptation(found), "Lyapunov function, and drift under a push."
         ),
     ]
 
@@ -462,10 +425,7 @@ ADAPTATION = Part[Adaptation](
 
 @dataclass(frozen=True)
 class ChainStudy:
-    """Frequency responses of a chain of robots, and simulations of the same chain.
-
-    In a chain, each robot follows the robot in front of it.
-    """
+    """Frequency responses of a chain of robots, and simulations of the same chain."""
 
     chain: RobotChain
     runs: tuple[ChainRun, ...]
@@ -481,10 +441,7 @@ def _chain(study: Study) -> ChainStudy:
         tuple(shake_chain(scenario, name, peak) for name, peak in kinds),
         tuple(
             brake_chain(
-                scenario,
-                name,
-                feed_forward=peak.feed_forward,
-                spacing_m=peak.spacing_m,
+                scenario, name, feed_forward=peak.feed_forward, spacing_m=peak.spacing_m
             )
             for name, peak in kinds
         ),

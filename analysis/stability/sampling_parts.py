@@ -19,11 +19,7 @@ from analysis.linear.burst_cycle import (
     burst_cycle,
     simulate_burst_cycle,
 )
-from analysis.linear.contact_mode import (
-    ContactLimits,
-    contact_limits,
-    contact_model,
-)
+from analysis.linear.contact_mode import ContactLimits, contact_limits, contact_model
 from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
 from analysis.linear.delayed_run import DelayCheck, check_delay_margin
 from analysis.linear.linear_plots import plot_contact_limits, plot_delay_check
@@ -51,8 +47,7 @@ class SampledLoop:
     margins: tuple[DelayMargin, ...]
     """Delay margins, one for each place of the delay and direction of motion."""
     check: DelayCheck | None
-    """Simulations just below and just above the delay margin at the sensor. None if
-    this margin is infinite."""
+    """Simulations around the delay margin at the sensor; None if it is infinite."""
 
     @property
     def least_s(self) -> float:
@@ -62,11 +57,9 @@ class SampledLoop:
 
 @dataclass(frozen=True)
 class BurstCycles:
-    """Stability of the robot behind a source that sounds in bursts.
+    """Stability over cycles of a burst of sound and silence, one result per hold.
 
-    A burst cycle consists of one burst of sound and the silence after it. In the
-    silence, the robot holds the position of the target in one of several ways. There is
-    one result for each way.
+    A hold is a way in which the robot keeps the target's position in the silence.
     """
 
     today: str
@@ -190,11 +183,7 @@ def _burst_document(data: BurstCycles) -> dict[str, Any]:
 
 
 def _slowest(multipliers: NDArray[np.complex128]) -> Sequence[complex]:
-    """Returns up to four multipliers of a burst cycle, largest first.
-
-    Of each conjugate pair, only one multiplier is returned. Multipliers with a
-    magnitude of at most 1e-3 are left out.
-    """
+    """Returns up to four multipliers, largest first, one of each conjugate pair."""
     found = [complex(m) for m in multipliers if m.imag >= 0.0 and abs(m) > 1e-3]
     return found[:4]
 

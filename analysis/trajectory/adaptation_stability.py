@@ -51,10 +51,7 @@ _DRAWN = 600
 
 @dataclass(frozen=True)
 class LyapunovRun:
-    """Lyapunov function V and gains over a run without contacts.
-
-    The gains start at half their desired values.
-    """
+    """Lyapunov function V in a run without contacts from half the desired gains."""
 
     time_s: NDArray[np.float64]
     """(n,) time, s."""
@@ -79,11 +76,7 @@ class LyapunovRun:
 
 @dataclass(frozen=True)
 class Drift:
-    """Drift of the stiffness K under a constant push that the reference model ignores.
-
-    K is computed twice: without limits of the gains, and with those of the scenario
-    ("limited").
-    """
+    """Drift of K under a constant push that the reference model does not include."""
 
     push_n: float
     """Push F, N."""
@@ -103,21 +96,14 @@ class Drift:
 
 @dataclass(frozen=True)
 class Jam:
-    """Stiffness K while a wall blocks the robot, and after the wall is removed.
-
-    The target moves on while the robot is blocked.
-    """
+    """Stiffness K while a wall blocks the robot, and after the wall is removed."""
 
     jam_s: float
     """Duration of the jam, s."""
     after_s: float
     """Simulated time after the jam, s."""
     end_n_m: tuple[float, float]
-    """Stiffness K at the end of the jam, N/m.
-
-    The first value is without limits of the gains. The second value is with the
-    scenario's limits.
-    """
+    """K at the end of the jam without limits, and with those of the scenario, N/m."""
     left_n_m: tuple[float, float]
     """Stiffness K at the end of the run, in the same order; infinite if K diverged."""
 
@@ -156,12 +142,7 @@ class AdaptationStability:
     drift: Drift
     jam: Jam
     critical: CriticalRate
-    """Critical adaptation rate for a target with the amplitude K_e S/K.
-
-    If the target leads by K_e S/K, it pulls the robot through a contact. K_e is the
-    stiffness of contacts, S is the distance at which contacts begin, and K is the
-    stiffness to the target. If K_e is 0, the amplitude is 1 m.
-    """
+    """Critical rate for a target with the amplitude of ``pull_through_m``."""
     products: tuple[CriticalRate, ...]
     """Critical rates for the other amplitudes."""
     bounded: bool
@@ -177,15 +158,7 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
     """Analyzes the stability of the gain adaptation of a robot on a route.
 
     The results come from formulas, and from simulations of a point mass with motor lag.
-
-    Args:
-        scenario: Scenario whose law adapts its gains.
-
-    Returns:
-        The stability results.
-
-    Raises:
-        InputError: The law does not adapt its gains.
+    The function raises an InputError if the law does not adapt its gains.
     """
     own = route_law(scenario)
     if not isinstance(own, AdaptiveTrajectoryParameters):
@@ -226,14 +199,7 @@ def swinging_target(
     """Computes a target that oscillates along x: a (sin 0.6 t + 0.5 sin 1.7 t).
 
     The two frequencies allow the adaptation to distinguish stiffness K from damping D.
-
-    Args:
-        amplitude_m: Amplitude a, m.
-        duration_s: Duration, s.
-        tick_s: Control period, s.
-
-    Returns:
-        (ticks, 4) positions p_d and velocities v_d of the target, m and m/s.
+    The result has the shape (ticks, 4): positions p_d, m, and velocities v_d, m/s.
     """
     time = np.arange(0.0, duration_s, tick_s)
     targets = np.zeros((len(time), 4))
@@ -247,14 +213,7 @@ def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
 
     The adaptation rule has no limits of the gains. Ten rates per decade are tried. The
     interval below the first divergent rate is bisected. Some higher rates may not
-    diverge.
-
-    Args:
-        loop: Loop with the rule, gains, reference, mass, motor lag and control period.
-        amplitude_m: Amplitude of the target, m.
-
-    Returns:
-        The least critical rate. If no allowed rate is critical, the rate is infinite.
+    diverge. If no allowed rate is critical, the rate is infinite.
     """
     targets = swinging_target(amplitude_m, _CRITICAL_S, loop.tick_s)
 
@@ -277,19 +236,11 @@ def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
 
 
 def drift_stiffness(start: float, rate: float, push: float, time_s: float) -> float:
-    """Computes the stiffness K(t) of the gradient rule under a constant push F.
+    """Computes the stiffness K(t), N/m, of the gradient rule under a constant push, N.
 
-    At rest, the robot is off its target by F/K. The sensitivity of its position p is
-    dp/dK = -F/K^2. The gradient rule therefore gives K^3 K' = gamma F^2.
-
-    Args:
-        start: Initial stiffness K_0, N/m.
-        rate: Adaptation rate gamma, (N/m)^2/(m^2 s).
-        push: Push F, N.
-        time_s: Time t, s.
-
-    Returns:
-        K(t), N/m.
+    Under the push F, the robot rests off its target by F/K. The sensitivity of its
+    position p is dp/dK = -F/K^2. The gradient rule therefore gives K^3 K' = gamma F^2.
+    K starts at ``start``. The adaptation rate gamma has the unit (N/m)^2/(m^2 s).
     """
     return float((start**4 + 4.0 * rate * push**2 * time_s) ** 0.25)
 

@@ -45,10 +45,7 @@ _WATCHED_S, _DRIVEN_S = 25.0, 40.0
 
 
 class ChainNumbers(NamedTuple):
-    """Parameters of a simulated line of robots (chain), for the compiled code.
-
-    P is a robot's control point ahead of the axle.
-    """
+    """Parameters of a simulated line of robots (chain), for the compiled code."""
 
     gains: tuple[float, float, float, float]
     """K, D, K_e and D_e: stiffness and damping to the target, and those of contacts."""
@@ -65,11 +62,7 @@ class ChainNumbers(NamedTuple):
     top_speed: float
     """Largest speed of P, m/s."""
     motors: tuple[float, float]
-    """Effect of the motor lag over a control period.
-
-    The first value is the share of the old speed in the new speed. The second value is
-    the coasting distance per old speed, s.
-    """
+    """Share of the old speed after a control period, and coasting per old speed, s."""
     late_ticks: int
     """Latency of the observed neighbors, in control periods."""
     tick_s: float
@@ -87,11 +80,7 @@ def _object(
 
 @njit(cache=True)
 def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cover
-    """Positions of the control points P of all robots at each control period.
-
-    The robots start in formation. Their initial speed is that of the first robot's
-    first step.
-    """
+    """Positions P at each control period; the robots start in formation."""
     ticks, robots, tick_s = len(first), len(gaps) + 1, numbers.tick_s
     places = np.empty((ticks, robots))
     begin = (first[1] - first[0]) / tick_s
@@ -154,19 +143,13 @@ def run_chain(
 
     The simulation uses the law's own functions. The simulation includes contacts with
     both neighbors, the limits of acceleration and speed, and the motor lag, but no
-    safety filter. P is a robot's control point ahead of the axle.
+    safety filter.
 
-    Args:
-        scenario: Scenario with the law, robot, motors, control period and latency of
-            the object sensor.
-        first_m: (ticks,) positions P of the first robot, m. The first step gives the
-            initial speed of all robots.
-        feed_forward: Target velocity over velocity of the robot ahead.
-        spacing_m: Desired distance between the points P of neighbors, m.
-        robots: Number of robots, including the first.
-
-    Returns:
-        (ticks, robots) positions P, m.
+    All positions are those of the control point P ahead of the axle, m: the result has
+    the shape (ticks, robots). The first step of the (ticks,) positions ``first_m``
+    gives the initial speed of all robots. ``feed_forward`` is the target velocity over
+    the velocity of the robot ahead. ``spacing_m`` is the desired distance between
+    neighbors.
     """
     own, robot, tick_s = route_law(scenario), scenario.only.robot, scenario.tick_s
     lag = scenario.only.plant.motor_lag_s
@@ -213,15 +196,8 @@ def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
     """Simulates eight robots on a line, of which the first oscillates.
 
     The oscillation has the frequency of the largest amplification. If nothing is
-    amplified, the oscillation has the natural frequency of a robot.
-
-    Args:
-        scenario: Scenario as for ``run_chain``.
-        name: Name of the chain of robots.
-        peak: Largest amplification of the chain, with its frequency.
-
-    Returns:
-        Amplitudes over the last five of forty periods.
+    amplified, the oscillation has the natural frequency of a robot. The amplitudes are
+    those of the last five of forty periods.
     """
     natural = math.sqrt(route_law(scenario).stiffness_n_m / scenario.only.robot.mass_kg)
     omega = peak.frequency_rad_s if peak.grows else natural
@@ -244,10 +220,7 @@ def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
 
 @dataclass(frozen=True)
 class BrakedChain:
-    """Gaps in a chain whose first robot brakes from the target's speed to rest.
-
-    P is a robot's control point ahead of the axle.
-    """
+    """Gaps in a chain whose first robot brakes from the target's speed to rest."""
 
     name: str
     time_s: NDArray[np.float64]
@@ -265,15 +238,8 @@ def brake_chain(
 ) -> BrakedChain:
     """Simulates eight robots in formation, of which the first brakes to rest.
 
-    Args:
-        scenario: Scenario as for ``run_chain``. Its route gives the speed and the
-            braking acceleration.
-        name: Name of the chain.
-        feed_forward: Target velocity over velocity of the robot ahead.
-        spacing_m: Desired distance between the control points P of neighbors, m.
-
-    Returns:
-        Gaps between neighbors after the braking began.
+    The scenario's route gives the speed and the braking acceleration. The other
+    arguments are those of ``run_chain``.
     """
     speed, slope = (
         scenario.router.route.speed_m_s,

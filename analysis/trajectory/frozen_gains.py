@@ -66,14 +66,8 @@ class FrozenPoint:
 def frozen_gains(scenario: Scenario) -> tuple[FrozenPoint, ...]:
     """Computes poles and margins at each operating point of ``route_points``.
 
-    Args:
-        scenario: Scenario whose robot follows a route.
-
-    Returns:
-        One entry per operating point.
-
-    Raises:
-        InputError: The law is not for a route, or the wheels can slip.
+    The function raises an InputError if the law is not for a route, or if the wheels
+    can slip.
     """
     return tuple(_frozen(scenario, point) for point in route_points(scenario))
 
@@ -98,10 +92,7 @@ def _frozen(scenario: Scenario, point: RoutePoint) -> FrozenPoint:
 
 @dataclass(frozen=True)
 class GainBounds:
-    """Bounds of stiffness K and damping D of the sampled loop.
-
-    Several fields have one value per delay of the position measurement.
-    """
+    """Bounds of stiffness K and damping D, some for each delay of the position."""
 
     mass: SampledMass
     """Mass, motor lag and control period."""
@@ -116,16 +107,9 @@ class GainBounds:
     today: dict[str, tuple[float, float]]
     """(K, D) of the scenario, for the target alone and with a contact."""
     stable_today_n_m: tuple[float, ...]
-    """Stiffness at which the loop with the scenario's damping becomes unstable, N/m.
-
-    The tuple has one value per delay of the position.
-    """
+    """Stiffness at which the loop with the scenario's damping becomes unstable, N/m."""
     damped_today_n_m: tuple[float, ...]
-    """Stiffness up to which the loop with the scenario's damping is well damped, N/m.
-
-    Well damped means a damping ratio of 0.7 or more. The tuple has one value per delay
-    of the position.
-    """
+    """Stiffness up to which that loop has a damping ratio of at least 0.7, N/m."""
     closed_form_n_m: tuple[float, ...]
     """``stable_today_n_m`` as computed by ``stiffness_bound``, N/m."""
     most_damping_n_s_m: float
@@ -133,11 +117,7 @@ class GainBounds:
     closed_damping_n_s_m: float
     """Largest stable sum of dampers by the formula 2 M/T, N s/m."""
     contacts: float
-    """Largest number of simultaneous contacts for which the loop is stable.
-
-    Each contact has its full damping. If contacts have no damping, the number is
-    infinite.
-    """
+    """Largest stable number of contacts with full damping; infinite without damping."""
     box: tuple[tuple[float, float], tuple[float, float]] | None
     """Ranges of K and of D to which the adaptation is limited; None without limits."""
 
@@ -146,16 +126,8 @@ def gain_bounds(scenario: Scenario) -> GainBounds:
     """Computes bounds of stiffness K and damping D by bisection.
 
     Stability follows from the eigenvalues of the blocks' state matrix over one control
-    period.
-
-    Args:
-        scenario: Scenario whose robot follows a route.
-
-    Returns:
-        The bounds, with curves over the damping D.
-
-    Raises:
-        InputError: The law is not for a route, or the wheels can slip.
+    period. The function raises an InputError if the law is not for a route, or if the
+    wheels can slip.
     """
     own = route_law(scenario)
     of = SampledMass(
@@ -196,14 +168,9 @@ def axis_damping_ratio(
 ) -> float:
     """Computes the damping ratio of the least damped mode along one axis.
 
-    Args:
-        scenario: Scenario with the robot, plant and control period.
-        stiffness: Sum of all springs, N/m, above 0.
-        damping: Sum of all dampers, N s/m.
-        late_ticks: Delay of the position that the springs act on, in control periods.
-
-    Returns:
-        Least value of -Re s/|s| over all modes; 1 if no mode oscillates.
+    The ratio is the least value of -Re s/|s| over all modes; 1 if no mode oscillates.
+    ``stiffness`` is the sum of all springs, N/m, above 0. ``damping`` is the sum of all
+    dampers, N s/m. The springs act on a position that is ``late_ticks`` old.
     """
     return contact_model(
         scenario, stiffness, damping_n_s_m=damping, latency_ticks=late_ticks
@@ -211,15 +178,10 @@ def axis_damping_ratio(
 
 
 def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) -> float:
-    """Computes the largest stiffness that gives a damping ratio of at least 0.7.
+    """Computes the largest stiffness with a damping ratio of at least 0.7, N/m.
 
-    Args:
-        scenario: Scenario with the robot, plant and control period.
-        damping: Sum of all dampers, N s/m.
-        late_ticks: Delay of the position that the springs act on, in control periods.
-
-    Returns:
-        Stiffness, N/m; 0 if no stiffness has this damping ratio.
+    The sum of all dampers is ``damping``, N s/m. If no stiffness has this damping
+    ratio, the result is 0.
     """
     return _last(
         lambda k: axis_damping_ratio(scenario, k, damping, late_ticks) >= WELL_DAMPED

@@ -40,20 +40,14 @@ class PointLoop(NamedTuple):
 
     law: AdaptiveTrajectoryParameters
     poles: tuple[float, float] | None = None
-    """Natural frequency w_n, rad/s, and damping ratio xi of the reference model.
-
-    If None, the gains of the law determine them.
-    """
+    """w_n, rad/s, and xi of the reference model; None: those of the law's gains."""
     robot: RobotParameters = RobotParameters()
     motor_lag_s: float = 0.0
     tick_s: float = TICK_S
 
 
 class PointRun(NamedTuple):
-    """States at each control period, before its updates.
-
-    P is the robot's control point ahead of the axle.
-    """
+    """States at each control period, before its updates. P is the control point."""
 
     motion: NDArray[np.float64]
     """(ticks, 4) position p and velocity v of P's virtual mass, x and y, m and m/s."""
@@ -140,18 +134,11 @@ def run_point(
     simulation has no heading, and no limits of speed and acceleration. The formulas of
     the analysis make the same assumptions.
 
-    Args:
-        loop: The law and the robot.
-        targets: (ticks, 4) positions p_d and velocities v_d of the target, m and m/s.
-        places: (ticks, n, 4) or (n, 4) positions and velocities of contact points, m
-            and m/s. Points with x beyond 1e6 m are ignored.
-        start: (4,) initial position and velocity. None: those of the first target.
-        push: Constant force on P, N.
-        held: Largest x that P can reach, m. Either (ticks,), or one value for all
-            control periods.
-
-    Returns:
-        States at each control period.
+    The (ticks, 4) ``targets`` are positions and velocities of the target, m and m/s.
+    The (ticks, n, 4) or (n, 4) ``places`` are those of contact points; points with x
+    beyond 1e6 m are ignored. The run starts at the (4,) ``start``, or at the first
+    target. ``push`` is a constant force on P, N. ``held`` is the largest x that P can
+    reach, m, either (ticks,) or one value for all control periods.
     """
     wanted = np.asarray(targets, dtype=float)
     points = np.asarray(places, dtype=float)

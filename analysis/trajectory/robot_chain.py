@@ -95,29 +95,15 @@ class RobotChain:
     peaks: dict[str, ChainPeak]
     """Largest amplification of each chain, by name of the chain."""
     least_damping_n_s_m: float
-    """Least damping D that does not amplify motions of two robots apart, N s/m.
-
-    The chain has no feed-forward and the stiffness ``stiffness_n_m``. If no tried D
-    suffices, the value is infinite.
-    """
+    """Least D at which a pair apart without feed-forward does not amplify, N s/m."""
     least_damping_in_contact_n_s_m: float
-    """Least damping D that does not amplify motions of eight robots in contact, N s/m.
-
-    The chain has no feed-forward and the stiffness ``stiffness_n_m``. If no tried D
-    suffices, the value is infinite.
-    """
+    """The same for eight robots in contact, N s/m; infinite if no tried D suffices."""
     most_feed_forward: float
-    """Largest ratio of velocity feed-forward that does not amplify motions.
-
-    If motions are amplified even without feed-forward, the value is negative.
-    """
+    """Largest feed-forward without amplification; negative if none is small enough."""
     dampings: NDArray[np.float64]
     """(n,) tried values of D, N s/m."""
     peaks_by_damping: NDArray[np.float64]
-    """(n, 2) largest amplification with and without feed-forward at this K.
-
-    If a single robot is unstable, the value is infinite.
-    """
+    """(n, 2) largest amplification with and without feed-forward; inf if unstable."""
 
     @property
     def time_headway_s(self) -> float:
@@ -131,17 +117,8 @@ def robot_chain(scenario: Scenario) -> RobotChain:
     All robots are like the scenario's robot. Each robot's target is a fixed distance
     behind the robot ahead, and has the velocity of the robot ahead. The object sensor
     measures the position of the robot ahead. The velocity is computed from the last two
-    positions.
-
-    Args:
-        scenario: Scenario with the law, mass, motors, control period and latency of the
-            object sensor.
-
-    Returns:
-        Responses and bounds.
-
-    Raises:
-        InputError: The law is not for a route, or the wheels can slip.
+    positions. The function raises an InputError if the law is not for a route, or if
+    the wheels can slip.
     """
     own = route_law(scenario)
     k, d = own.stiffness_n_m, own.damping_n_s_m
@@ -178,18 +155,12 @@ def robot_chain(scenario: Scenario) -> RobotChain:
 
 
 def chain_spacings(scenario: Scenario) -> tuple[float, float]:
-    """Computes two distances between neighboring robots: without and with contacts.
+    """Computes two distances between neighboring robots, m: without and with contacts.
 
-    Other robots observe a moving robot as the disc that encloses it. P is a robot's
-    control point.
-
-    Args:
-        scenario: Scenario with the law and the robot.
-
-    Returns:
-        Two distances between the points P of neighbors, m. With the first, P is 1.25
-        security zones from the disc of the robot ahead. With the second, P is half a
-        security zone from the disc.
+    The distances are between the control points P. Other robots observe a moving robot
+    as the disc that encloses it. With the first distance, P is 1.25 security zones from
+    the disc of the robot ahead. With the second, P is half a security zone from the
+    disc.
     """
     zone_m = route_law(scenario).security_zone_m
     offset = disc_offsets(scenario)[0]
@@ -197,16 +168,11 @@ def chain_spacings(scenario: Scenario) -> tuple[float, float]:
 
 
 def disc_offsets(scenario: Scenario) -> tuple[float, float]:
-    """Computes how much nearer a neighbor's disc is than its control point P.
+    """Computes how much nearer a neighbor's disc is than its control point P, m.
 
-    Other robots observe a moving robot as the disc that encloses it. The disc has its
-    center at the axle, and P is ahead of the axle.
-
-    Args:
-        scenario: Scenario with the robot.
-
-    Returns:
-        Two offsets, m: the first for the robot ahead, the second for the robot behind.
+    The first offset is for the robot ahead, and the second for the robot behind. Other
+    robots observe a moving robot as the disc that encloses it. The disc has its center
+    at the axle, and P is ahead of the axle.
     """
     disc = 0.5 * math.hypot(scenario.only.robot.length_m, scenario.only.robot.width_m)
     epsilon = scenario.only.robot.control_point_m
@@ -220,18 +186,11 @@ def _late(scenario: Scenario) -> int:
 def resting_gaps(
     scenario: Scenario, spacing_m: float, robots: int
 ) -> NDArray[np.float64]:
-    """Computes the distances between neighbors in a chain at rest.
+    """Computes the (robots - 1,) distances between the points P of a chain at rest, m.
 
-    Contacts push the robots apart. The computation starts at the last robot, which has
-    a contact only with the robot ahead. P is a robot's control point.
-
-    Args:
-        scenario: Scenario with the law and the robot.
-        spacing_m: Desired distance between the points P of neighbors, m.
-        robots: Number of robots, including the first.
-
-    Returns:
-        (robots - 1,) distances between points P, from the first robot to the last, m.
+    The first distance is that behind the first robot. ``spacing_m`` is the desired
+    distance. Contacts push the robots apart. The computation starts at the last robot,
+    which has a contact only with the robot ahead.
     """
     own = route_law(scenario)
     k, k_e, zone_m = own.stiffness_n_m, own.contact_stiffness_n_m, own.security_zone_m
@@ -252,19 +211,11 @@ def resting_gaps(
 def links_of(
     scenario: Scenario, feed_forward: float, spacing_m: float, robots: int
 ) -> tuple[ChainLinks, ...]:
-    """Computes the springs and dampers between the robots of a chain at rest.
+    """Computes the springs and dampers of each robot of a chain, except the first.
 
-    A chain is a line of robots that follow one another.
-
-    Args:
-        scenario: Scenario with the law, robot and latency of the object sensor.
-        feed_forward: Target velocity over velocity of the robot ahead.
-        spacing_m: Desired distance between the control points P of neighbors, m.
-        robots: Number of robots, including the first.
-
-    Returns:
-        One entry per robot except the first. If a neighbor's disc is outside the
-        security zone, its contact has no stiffness and no damping.
+    The chain is at rest. If a neighbor's disc is outside the security zone, its contact
+    has no stiffness and no damping. ``spacing_m`` is the desired distance between the
+    points P of neighbors.
     """
     own = route_law(scenario)
     gaps = resting_gaps(scenario, spacing_m, robots)
@@ -293,15 +244,8 @@ def chain_response(
     Each robot obeys M a = -K (p - p') - D (v - c v'), plus the forces of its contacts.
     p' and v' are position and velocity of the robot ahead, and c is the ratio of
     velocity feed-forward. Wheel command and plant give p = G_p a and v = G_v a. The
-    first robot's motion is given.
-
-    Args:
-        scenario: Scenario with the mass, motors and control period.
-        links: Springs and dampers of each robot except the first.
-        omega: (n,) frequencies, rad/s.
-
-    Returns:
-        (n, len(links)) complex amplitudes relative to the first robot's amplitude.
+    first robot's motion is given. For (n,) frequencies in rad/s, the result has the
+    shape (n, len(links)).
     """
     grid, count = np.asarray(omega, dtype=float), len(links)
     response = motion_chain(scenario).response(grid)
@@ -334,16 +278,6 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
     """Computes how much a line of robots (chain) amplifies its first robot's motion.
 
     The frequencies range from 0.01 rad/s to the Nyquist frequency.
-
-    Args:
-        scenario: Scenario with the law, mass, motors, control period and latency of the
-            object sensor.
-        feed_forward: Target velocity over velocity of the robot ahead.
-        spacing_m: Desired distance between the control points P of neighbors, m.
-
-    Returns:
-        Largest amplifications, for chains of 2 to 8 robots, and for each robot of the
-        longest chain.
     """
     most = ROBOTS[-1]
     links = {n: links_of(scenario, feed_forward, spacing_m, n) for n in ROBOTS}
@@ -390,14 +324,9 @@ def _peak(
 def chain_model(scenario: Scenario, links: Sequence[ChainLinks]) -> LinearModel:
     """Returns the sampled model of the robots behind a first robot at rest.
 
-    Args:
-        scenario: Scenario with the mass, motors and control period.
-        links: Springs and dampers of each robot except the first.
-
-    Returns:
-        Closed loop without inputs. The outputs are the positions of the robots, m. The
-        states of each robot are those of ``sampled_matrix``, followed by the earlier
-        positions that its neighbors observe.
+    The model has no inputs. The outputs are the positions of the robots, m. The states
+    of each robot are those of ``sampled_matrix``, followed by the earlier positions
+    that its neighbors observe.
     """
     tick_s, mass = scenario.tick_s, scenario.only.robot.mass_kg
     of = SampledMass(mass, scenario.only.plant.motor_lag_s, tick_s)
@@ -448,14 +377,10 @@ def _stable_peak(
 
 
 def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
-    """Computes the least damping D at which no robot oscillates more than the first.
+    """Computes the least damping D, N s/m, at which no robot moves more than the first.
 
-    Args:
-        scenario: Scenario with the mass, motors and control period.
-        links: Springs and dampers of each robot except the first. Their D is replaced.
-
-    Returns:
-        D by bisection, N s/m. If no tried D suffices, the result is infinite.
+    The computation replaces the D of the links, and bisects. If no tried D suffices,
+    the result is infinite.
     """
 
     def calm(damping: float) -> bool:
@@ -480,17 +405,9 @@ def most_feed_forward(scenario: Scenario, stiffness: float, damping: float) -> f
     """Computes the largest velocity feed-forward that does not amplify motions.
 
     Feed-forward is the ratio of a target's velocity to the velocity of the robot ahead.
-    The chain has no contacts.
-
-    Args:
-        scenario: Scenario with the mass, motors, control period and latency of the
-            object sensor.
-        stiffness: Stiffness K, N/m.
-        damping: Damping D, N s/m.
-
-    Returns:
-        Ratio from 0 to 1, by bisection. If motions are amplified even without
-        feed-forward, the result is -1.
+    The chain has no contacts, the stiffness K in N/m and the damping D in N s/m. The
+    result is a ratio from 0 to 1, by bisection. If motions are amplified even without
+    feed-forward, the result is -1.
     """
     late = _late(scenario)
 

@@ -49,16 +49,10 @@ class RoutePoint:
 
 
 def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
-    """Returns the parameters of the law of a robot on a route.
+    """Returns the parameters of the law of the scenario's only robot.
 
-    Args:
-        scenario: Scenario with one robot.
-
-    Returns:
-        Parameters of the law.
-
-    Raises:
-        InputError: The robot has no route, or its law is not for a route.
+    The function raises an InputError if the robot has no route, or if its law is not
+    for a route.
     """
     if scenario.only.kind != "router" or scenario.only.law not in ROUTE_LAWS:
         raise InputError(
@@ -73,12 +67,7 @@ def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
 def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
     """Lists operating points: on the route, at rest, and at distances from a wall.
 
-    Args:
-        scenario: Scenario whose robot follows a route.
-
-    Returns:
-        Operating points. Those at a wall exist only if the law has a contact spring or
-        a contact damper.
+    The points at a wall exist only if the law has a contact spring or a contact damper.
     """
     own = route_law(scenario)
     points = [
@@ -95,14 +84,10 @@ def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
 def contact_gains(
     own: TrajectoryImpedanceParameters, distance_m: float
 ) -> tuple[float, float]:
-    """Computes the stiffness and damping that a contact adds along its normal.
+    """Computes the stiffness, N/m, and damping, N s/m, that a contact adds.
 
-    Args:
-        own: Parameters of the law.
-        distance_m: Distance from control point P to the object, m.
-
-    Returns:
-        Stiffness, N/m, and damping, N s/m. Outside the security zone, both are 0.
+    They act along the contact's normal. ``distance_m`` is the distance from the control
+    point P to the object. Outside the security zone, both are 0.
     """
     if distance_m >= own.security_zone_m:
         return 0.0, 0.0
@@ -113,36 +98,21 @@ def contact_gains(
 def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
     """Computes a minimal linear model of the closed loop over a control period.
 
-    The law, wheel command, plant and odometry are those of the simulation. Each block
-    is linearized by AutoDiff. The blocks are connected by the names of their ports.
-    States that are not controllable or not observable are removed. The model assumes
-    that the safety filter is inactive, that gains do not adapt, and that no limit is
-    reached.
-
-    Args:
-        scenario: Scenario whose robot follows a route.
-        point: Operating point.
-
-    Returns:
-        Model from the target, m and m/s, to the position of control point P, m.
-
-    Raises:
-        InputError: The law is not for a route, or the wheels can slip.
+    The inputs are the target's position, m, and velocity, m/s. The outputs are the
+    position of the control point P, m. The law, wheel command, plant and odometry are
+    those of the simulation. Each block is linearized by AutoDiff. The blocks are
+    connected by the names of their ports. States that are not controllable or not
+    observable are removed. The model assumes that the safety filter is inactive, that
+    gains do not adapt, and that no limit is reached. The function raises an InputError
+    if the law is not for a route, or if the wheels can slip.
     """
     return minimal_model(whole_route_model(scenario, point))
 
 
 def whole_route_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """Computes the model of the closed loop over a control period, with every state.
+    """Computes the model of ``frozen_model`` with every state.
 
     The states are those of plant, odometry, wheel command and observed objects.
-
-    Args:
-        scenario: Scenario whose robot follows a route.
-        point: Operating point.
-
-    Returns:
-        Model from the target, m and m/s, to the position of control point P, m.
     """
     models = _blocks(scenario, point)
     targets = tuple(f"target_state[{k}]" for k in range(4))
@@ -161,17 +131,9 @@ def whole_route_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
 
 
 def acceleration_loop(scenario: Scenario, point: RoutePoint, axis: str) -> LinearModel:
-    """Computes the open loop, cut at the law's acceleration along one axis.
+    """Computes the open loop L, cut at the law's acceleration along one of ``AXES``.
 
-    The loop along the other axis stays closed.
-
-    Args:
-        scenario: Scenario whose robot follows a route.
-        point: Operating point.
-        axis: One of ``AXES``.
-
-    Returns:
-        Loop transfer function L for negative feedback.
+    L is for negative feedback. The loop along the other axis stays closed.
     """
     k = AXES.index(axis)
     models = tuple(
@@ -246,31 +208,25 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
         read_after=True,
     )
     before = [-speed * tick_s, 0.0, 0.0, *(-tick_s * wheels)]
-    models = (
-        (plant, driven),
-        (
-            odometry,
-            block_model(
-                odometry, np.array(before), [np.zeros(2), wheels], period_s=tick_s
-            ),
-        ),
-        (
-            law,
-            block_model(law, np.empty(0), [target, objects, pose, v], period_s=tick_s),
-        ),
-        (
-            command,
-            block_model(
-                command,
-                np.array([*v, *wheels]),
-                [np.zeros(2), pose],
-                period_s=tick_s,
-                held={"wheel_speeds"},
-            ),
-        ),
+    moved = block_model(
+        odometry, np.array(before), [np.zeros(2), wheels], period_s=tick_s
     )
-    named = tuple(_named(block, model) for block, model in models)
-    return (*named, _seen_wall(scenario, point))
+    inputs = [target, objects, pose, v]
+    pulled = block_model(law, np.empty(0), inputs, period_s=tick_s)
+    commanded = block_model(
+        command,
+        np.array([*v, *wheels]),
+        [np.zeros(2), pose],
+        period_s=tick_s,
+        held={"wheel_speeds"},
+    )
+    return (
+        _named(plant, driven),
+        _named(odometry, moved),
+        _named(law, pulled),
+        _named(command, commanded),
+        _seen_wall(scenario, point),
+    )
 
 
 def _named(block: Block, model: LinearModel) -> LinearModel:

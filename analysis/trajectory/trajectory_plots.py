@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -151,12 +150,7 @@ def plot_adaptation(found: AdaptationStability) -> Figure:
 def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
     """Plots the amplification over frequency, over robots and over D.
 
-    Args:
-        chain: Frequency responses.
-        runs: Simulated amplitudes in the same chains.
-
-    Returns:
-        A figure with three panels.
+    Dots show the simulated amplitudes of ``runs`` in the same chains.
     """
     figure = Figure(figsize=(11.4, 3.9), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
@@ -182,14 +176,10 @@ def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
     right.set_xlabel(f"D (N s/m) at K = {chain.stiffness_n_m:g} N/m")
     right.set_ylabel("largest amplification by a pair")
     for axes in (left, middle, right):
-        _unit_line(axes)
+        axes.axhline(1.0, color="black", linewidth=0.8)
+        axes.grid(visible=True, linewidth=0.3)
         axes.legend(fontsize=7)
     return figure
-
-
-def _unit_line(axes: Axes) -> None:
-    axes.axhline(1.0, color="black", linewidth=0.8)
-    axes.grid(visible=True, linewidth=0.3)
 
 
 def plot_braked_chains(chains: Sequence[BrakedChain]) -> Figure:

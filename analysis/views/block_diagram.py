@@ -6,7 +6,7 @@ are not installed on every machine.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from itertools import cycle
@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from pydrake.systems.framework import Diagram
+from pydrake.systems.primitives import VectorLogSink
 
-from analysis.views.wires import Wire, blocks, wires
 from systems.framework.block import STAGES, Stage, part_of
 
 #: Fill color of the blocks of each stage.
@@ -44,6 +44,16 @@ WIRE_COLOURS = (
 )
 #: Sizes of the elements of the picture, px.
 MARGIN, HEADER, ROW, TRACK, GAP, CHARACTER = 24, 42, 20, 9, 36, 6.7
+
+
+@dataclass(frozen=True)
+class Wire:
+    """The names of two connected ports, and of their blocks."""
+
+    source: str
+    output: str
+    target: str
+    input: str
 
 
 @dataclass
@@ -96,19 +106,12 @@ class _Layout:
 
 
 def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
-    """Returns a picture of the block diagram as SVG text.
+    """Returns a picture of the block diagram as one SVG element.
 
     The signals go from left to right. Wires to a neighboring column are drawn directly.
     All other wires go along the bus, a set of horizontal lines between the two rows of
     blocks. The name of an output port is gray if no input port reads it. Logs are left
-    out.
-
-    Args:
-        diagram: The diagram to draw.
-        flat: Whether a nested diagram is replaced by the blocks that it contains.
-
-    Returns:
-        The text of one SVG element, with a newline at the end.
+    out. If the picture is flat, it shows the blocks inside of a nested diagram.
     """
     connections = wires(diagram, flat=flat)
     layout = _arrange(blocks(diagram, flat=flat), connections)
@@ -131,16 +134,7 @@ def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
 def write_block_diagram(
     diagram: Diagram, path: str | Path, *, flat: bool = True
 ) -> None:
-    """Writes the block diagram as an SVG file.
-
-    Args:
-        diagram: The diagram to draw.
-        path: Path of the SVG file.
-        flat: Whether a nested diagram is replaced by the blocks that it contains.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Writes the picture of ``block_svg`` as an SVG file."""
     Path(path).write_text(block_svg(diagram, flat=flat), encoding="utf-8")
 
 
@@ -183,9 +177,8 @@ def _arrange(systems: Sequence[Any], connections: Sequence[Wire]) -> _Layout:
 
 
 def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
-    """Assigns each box to a column of the picture.
+    """Assigns each box to a column, after all boxes whose outputs it reads.
 
-    The first column is on the left. A box comes after all boxes whose outputs it reads.
     Boxes then move to the right, up to the boxes that read their outputs. Wires that
     close a loop, or that go back to an earlier stage, do not count.
     """
@@ -329,3 +322,72 @@ def _text(
         f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}" '
         f'fill="{colour}"{weight}>{text}</text>'
     )
+
+
+def blocks(diagram: Diagram, *, flat: bool = True) -> list[Any]:
+    """Returns the systems of a diagram, except logs, in the order of the diagram.
+
+    A system whose outputs only go to logs is also left out. If the result is flat, a
+    nested diagram is replaced by the systems that it contains.
+    """
+    systems = list(_systems(diagram, flat=flat))
+    logs = {s.get_name() for s in systems if isinstance(s, VectorLogSink)}
+    readers: dict[str, set[str]] = {}
+    for wire in _all_wires(diagram, flat=flat):
+        readers.setdefault(wire.source, set()).add(wire.target)
+    while more := {name for name, by in readers.items() if by <= logs} - logs:
+        logs |= more
+    return [s for s in systems if s.get_name() not in logs]
+
+
+def wires(diagram: Diagram, *, flat: bool = True) -> list[Wire]:
+    """Returns all wires between the systems that ``blocks`` returns.
+
+    The wires are sorted by target block, input port, and source block.
+    """
+    names = [block.get_name() for block in blocks(diagram, flat=flat)]
+    found = [wire for wire in _all_wires(diagram, flat=flat) if wire.target in names]
+    return sorted(found, key=lambda w: (names.index(w.target), w.input, w.source))
+
+
+def _systems(diagram: Diagram, *, flat: bool) -> Iterator[Any]:
+    for system in diagram.GetSystems():
+        if flat and isinstance(system, Diagram):
+            yield from _systems(system, flat=True)
+        else:
+            yield system
+
+
+def _all_wires(diagram: Diagram, *, flat: bool) -> list[Wire]:
+    found = []
+    for entry, exit_ in diagram.connection_map().items():
+        writer, output = _writer(*exit_) if flat else exit_
+        for reader, index in _readers(*entry) if flat else [entry]:
+            found.append(
+                Wire(
+                    writer.get_name(),
+                    writer.get_output_port(output).get_name(),
+                    reader.get_name(),
+                    reader.get_input_port(index).get_name(),
+                )
+            )
+    for system in diagram.GetSystems() if flat else []:
+        if isinstance(system, Diagram):
+            found += _all_wires(system, flat=True)
+    return found
+
+
+def _writer(system: Any, index: Any) -> tuple[Any, Any]:
+    """Returns the block and its output port behind an output port of a diagram."""
+    while isinstance(system, Diagram):
+        system, index = system.get_output_port_locator(index)
+    return system, index
+
+
+def _readers(system: Any, index: Any) -> Iterator[tuple[Any, Any]]:
+    """Yields the blocks and their input ports behind an input port of a diagram."""
+    if not isinstance(system, Diagram):
+        yield system, index
+        return
+    for inner in system.GetInputPortLocators(index):
+        yield from _readers(*inner)

@@ -9,31 +9,20 @@ from systems.sound.parameters import SoundParameters
 
 
 def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
-    """Returns all bursts of a sound that begin before a given time.
+    """Returns start and end, s, of all bursts of a sound that begin before a time, s.
 
-    Args:
-        sound: Parameters of the sound, which contain the schedule of the bursts.
-        end: Time, s. A burst that lasts longer ends at this time.
-
-    Returns:
-        Start and end of each burst, s.
+    A burst that lasts longer ends at this time.
     """
     starts = np.arange(sound.start_s, end, sound.period_s)
     return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
 
 
 def call_time(result: RunResult) -> float | None:
-    """Returns the time at which the sink first received a call.
+    """Returns the time, s, at which the sink first received a call, or None.
 
     The sink is the computer of the operator. After a robot has found the odor source,
     it calls the other robots. The function uses the radio frame with which a robot
     reports this find to the sink.
-
-    Args:
-        result: Result of a run, for one robot or all robots.
-
-    Returns:
-        Time, s. The value is None if the sink received no such frame.
     """
     times = [
         float(result.time[np.argmax(values > 0.5)])
@@ -44,15 +33,10 @@ def call_time(result: RunResult) -> float | None:
 
 
 def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
-    """Returns the bursts of the source that the robot hears.
+    """Returns start and end, s, of the bursts of the source that one robot hears.
 
-    If the robot listens to another robot that calls, the bursts begin after the call.
-
-    Args:
-        result: Result of a run, for one robot.
-
-    Returns:
-        Start and end of each burst, s. The list is empty if the robot drives to a goal.
+    If the robot listens to another robot that calls, the bursts begin after the call. A
+    robot that drives to a goal hears no bursts.
     """
     if result.scenario.only.has_goal:
         return []

@@ -97,19 +97,11 @@ class Panel(NamedTuple):
 
 
 def panels(result: RunResult, clearance: ArrayLike | None = None) -> list[Panel]:
-    """Returns all panels of a run's picture over time.
+    """Returns all panels of one robot's picture over time.
 
-    Args:
-        result: Result of a run, for one robot.
-        clearance: (n,) distance from the robot to the nearest body at each tick
-            (control period), m (``analysis.runs.proximity``). With None, there is no
-            panel of the clearance.
-
-    Returns:
-        Panels in the order of the picture.
-
-    Raises:
-        InputError: ``clearance`` does not have one value per tick.
+    The (n,) clearance is the distance to the nearest body at each tick (control
+    period), m (``analysis.runs.proximity``). Without it, there is no such panel. The
+    function raises an InputError if it does not have one value per tick.
     """
     robot, columns = result.scenario.only, result.columns
     wanted: list[Callable[[RunResult], Panel]]
@@ -139,16 +131,10 @@ def page_charts(
 ) -> list[dict[str, Any]]:
     """Returns the panels of all robots as plain data for the page of a replay.
 
-    Args:
-        result: Result of the run.
-        clearance: (n,) distance from each robot to the nearest body at the ticks
-            (control periods), m, by name of the robot. A robot without an entry has no
-            such chart.
-
-    Returns:
-        One dictionary per panel, with the title, the name of the robot (empty if there
-        is only one robot), the limits and the named values of the vertical axis, the
-        curves, and the bursts that the robot hears. In the curves, None is a gap.
+    The clearance of ``panels`` is by name of the robot. A robot without an entry has no
+    such chart. Each dictionary has the title, the name of the robot (empty if there is
+    only one robot), the limits and the named values of the vertical axis, the curves,
+    and the bursts that the robot hears. In the curves, None is a gap.
     """
     return [
         {
@@ -260,11 +246,7 @@ def _bearing(result: RunResult) -> Panel:
 def _forces(result: RunResult) -> Panel:
     curves = [
         Curve(
-            name,
-            result.time,
-            np.hypot(*result.vector(name)),
-            COLOURS[name],
-            width=1.2,
+            name, result.time, np.hypot(*result.vector(name)), COLOURS[name], width=1.2
         )
         for name in ("attraction", "repulsion")
     ]

@@ -60,18 +60,7 @@ _MARKS: dict[type, dict[str, Any]] = {
 
 
 class RunFrames:
-    """Draws a run from above at any time of the run.
-
-    The picture shows:
-
-    - robots with their microphones, sensor cones and paths
-    - sources, with rings while they sound
-    - the source position that each robot estimates
-    - obstacles, walls, and touched bodies
-
-    Args:
-        result: Result of the run.
-    """
+    """Draws a run from above at any time of the run, as in ``plot_trajectory``."""
 
     def __init__(self, result: RunResult) -> None:
         self._result, scene = result, make_scene(result)
@@ -107,11 +96,7 @@ class RunFrames:
     def frames(self, frames_per_s: float) -> Iterator[NDArray[np.uint8]]:
         """Yields the frames of a movie. The last frame shows the end of the run.
 
-        Args:
-            frames_per_s: Number of frames per second of the run.
-
-        Yields:
-            (rows, columns, 3) red, green and blue values of each frame.
+        Each frame has (rows, columns, 3) red, green and blue values.
         """
         count = max(1, round(self._result.simulated_s * frames_per_s))
         for number in range(count):

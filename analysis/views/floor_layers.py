@@ -28,18 +28,11 @@ def floor_layers(
 ) -> list[FloorLayer]:
     """Groups floor cells by the times at which they appear and disappear.
 
-    A cell that stays is in only one layer. Therefore all layers together need little
-    more memory than the last state of the floor.
-
-    Args:
-        known: Map that contains the times and the positions of the cells.
-        cells: (n, i, j) whether each cell is present at each of the n times.
-        whole: Whether neighboring cells are merged into larger rectangles. If not, each
-            cell has its own rectangle.
-
-    Returns:
-        Layers in the order of the times at which they begin. No two layers overlap at
-        any time.
+    The (n, i, j) cells state whether a cell is present at each of the n times of the
+    map. The layers have the order of the times at which they begin, and no two layers
+    overlap at any time. A cell that stays is in only one layer. Therefore all layers
+    together need little more memory than the last state of the floor. If ``whole`` is
+    true, neighboring cells are merged into larger rectangles.
     """
     count = len(cells)
     # For each cell that is present: index of the time at which it disappears.
@@ -57,14 +50,10 @@ def floor_layers(
 
 
 def merged_cells(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Finds rectangles that together cover each given cell exactly once.
+    """Finds rectangles that together cover each cell of an (i, j) mask exactly once.
 
-    Args:
-        cells: (i, j) whether each cell has to be covered.
-
-    Returns:
-        (m, 4) rectangles, as four indices: the first i, the i after the last, the first
-        j, and the j after the last.
+    A rectangle has four indices: the first i, the i after the last, the first j, and
+    the j after the last.
     """
     wide = cells.shape[0]
     padded = np.pad(cells, ((0, 1), (1, 1))).astype(np.int8)
@@ -90,16 +79,9 @@ def _single_cells(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
 def clipped(
     rectangles: NDArray[np.float64], within: tuple[float, float, float, float]
 ) -> NDArray[np.float64]:
-    """Clips rectangles to the inside of another rectangle.
+    """Clips (m, 4) rectangles to the inside of another one; outside, nothing remains.
 
-    Args:
-        rectangles: (m, 4) rectangles to clip: least x, greatest x, least y, greatest y,
-            m.
-        within: Rectangle that limits the others: least x, greatest x, least y, greatest
-            y, m.
-
-    Returns:
-        (k, 4) clipped rectangles, m. Rectangles that lie outside are removed.
+    A rectangle has the least x, greatest x, least y and greatest y, m.
     """
     x_low, x_high, y_low, y_high = within
     low, high = [x_low, x_low, y_low, y_low], [x_high, x_high, y_high, y_high]

@@ -52,15 +52,10 @@ def picture_title(result: RunResult) -> str:
 def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
     """Returns a rectangle that contains all bodies during the whole run.
 
-    The rectangle includes the walls of the room, if there is a room. It ignores
-    estimated positions, because a large error would enlarge the picture too much.
-
-    Args:
-        result: Result of the run.
-        margin: Space around the centers of the bodies, m.
-
-    Returns:
-        Least x, greatest x, least y, greatest y in the world frame W, m.
+    The rectangle has the least x, greatest x, least y and greatest y in the world frame
+    W, m. The margin, m, is around the centers of the bodies. The rectangle includes the
+    walls of the room, if there is a room. It ignores estimated positions, because a
+    large error would enlarge the picture too much.
     """
     scenario, times = result.full_scenario, picture_times(result, most=60)
     centres = [
@@ -81,28 +76,15 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
 
 
 def shown_rectangle(result: RunResult) -> tuple[float, float, float, float]:
-    """Returns the part of the floor that the initial view shows.
-
-    Args:
-        result: Result of the run.
-
-    Returns:
-        Least x, greatest x, least y, greatest y in the world frame W, m.
-    """
+    """Returns the floor that the initial view shows, in the format of ``bounds``."""
     return bounds(result, margin=0.5)
 
 
 def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
-    """Returns the edges of the floor in the world frame W.
+    """Returns the edges of the floor in whole meters, in the format of ``bounds``.
 
     The floor contains the whole run. It is at least as large as the arena of the
     scenario.
-
-    Args:
-        result: Result of the run.
-
-    Returns:
-        Least x, greatest x, least y, greatest y, as whole meters.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
     width, depth = result.full_scenario.arena_m

@@ -4,31 +4,42 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
+from analysis.reporting.palette import COLOURS
 from analysis.runs.recorded_run import SCENARIO_FILE, RecordedRun
-from analysis.views.markers import body_markers
-from analysis.views.ros2_values import (
-    WORLD_FRAME,
-    Message,
-    stamped,
-    stamped_pose,
-    transform,
-    vector,
+from analysis.views.scene import (
+    BODY_HEIGHT_M,
+    ROBOT_HEIGHT_M,
+    Box,
+    RobotBody,
+    SourceBody,
+    Thing,
+    scene_bodies,
+    sensor_pose,
 )
-from analysis.views.scene import scene_bodies, sensor_pose
 from diagrams import dump_scenario
 from diagrams.scenario.participants import HasRangeSensors, Robot
 from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import InputError
+from systems.sound.parameters import RoomParameters
 
+#: A message, as its fields by name.
+Message = dict[str, Any]
+#: Name of the world frame W.
+WORLD_FRAME = "world"
+#: Constants of ``visualization_msgs/Marker``.
+_CUBE, _LINE_LIST, _ADD = 1, 5, 0
+#: Width of the edges of a room, m.
+_EDGE_M = 0.03
 _PACKAGES = ("mcap", "mcap_ros2", "rosbags")
 #: Columns of poses, by topic. They become pose messages instead of single numbers.
 _POSES = {
@@ -45,8 +56,7 @@ _Entry = tuple[str, str, Message]
 def require_mcap() -> None:
     """Checks that the packages for MCAP files are installed.
 
-    Raises:
-        InputError: A package is not installed. The message explains how to install it.
+    If a package is not installed, an InputError explains how to install it.
     """
     missing = [name for name in _PACKAGES if find_spec(name) is None]
     if missing:
@@ -61,15 +71,7 @@ def write_mcap(run: RecordedRun, path: Path) -> None:
     """Writes a run as an MCAP file. docs/exports.md lists the topics of the file.
 
     The times in the file start at 0, as in the run. Two files of the same run have
-    equal bytes.
-
-    Args:
-        run: Scenario and table of the run.
-        path: Path of the MCAP file.
-
-    Raises:
-        InputError: A package is not installed.
-        OSError: The file cannot be written.
+    equal bytes. The function raises an InputError if a package is not installed.
     """
     require_mcap()
     from mcap_ros2.writer import Writer
@@ -117,7 +119,7 @@ def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
         entries: list[_Entry] = []
         frames: list[Message] = []
         if tick == 0:
-            markers = {"markers": body_markers(bodies, scenario.room, names)}
+            markers = {"markers": _body_markers(bodies, scenario.room, names)}
             entries.append(("/markers", "visualization_msgs/MarkerArray", markers))
         for name, own in run.robots.items():
             robot = scenario.robots[name]
@@ -127,10 +129,10 @@ def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
             if name in robots:
                 continue
             at = body.pose(tick).tolist()
-            frames.append(transform(time, WORLD_FRAME, names[name], at))
+            frames.append(_transform(time, WORLD_FRAME, names[name], at))
             # An obstacle at rest has a single pose.
             if tick < len(body.poses):
-                topic, message = f"/{names[name]}/pose", stamped_pose(time, at)
+                topic, message = f"/{names[name]}/pose", _stamped_pose(time, at)
                 entries.append((topic, "geometry_msgs/PoseStamped", message))
         entries.append(("/tf", "tf2_msgs/TFMessage", {"transforms": frames}))
         yield entries
@@ -152,8 +154,10 @@ def _plain(name: str) -> str:
     return plain if plain[:1].isalpha() else f"_{plain}"
 
 
-def _sensors(robot: Robot) -> int:
-    return robot.ultrasonic.count if isinstance(robot, HasRangeSensors) else 0
+def _sensors(robot: Robot, own: Mapping[str, NDArray[np.float64]]) -> list[int]:
+    """Returns the numbers, from 0, of the range sensors with readings in the table."""
+    count = robot.ultrasonic.count if isinstance(robot, HasRangeSensors) else 0
+    return [k for k in range(count) if f"range_{k + 1}" in own]
 
 
 def _robot_frames(
@@ -163,21 +167,17 @@ def _robot_frames(
     tick: int,
     time: float,
 ) -> Iterator[Message]:
-    """Yields the transforms of the frames of one robot.
+    """Yields the transforms of the robot frame B, of P, and of each range sensor.
 
-    The frames are the robot frame B, a frame at the control point P, and a frame for
-    each range sensor. The x axis of a sensor's frame is the axis of its cone.
+    The x axis of a sensor's frame is the axis of its cone.
     """
     base, ahead = f"{name}/base_link", robot.robot.control_point_m
     at = [float(own[key][tick]) for key in _POSES["pose"]]
-    yield transform(time, WORLD_FRAME, base, at)
-    yield transform(time, base, f"{name}/control_point", [ahead, 0.0, 0.0])
-    if not isinstance(robot, HasRangeSensors):
-        return
-    for k in range(robot.ultrasonic.count):
-        if f"range_{k + 1}" in own:
-            pose_BU = sensor_pose(robot, k).tolist()
-            yield transform(time, base, f"{name}/sensor_{k + 1}", pose_BU)
+    yield _transform(time, WORLD_FRAME, base, at)
+    yield _transform(time, base, f"{name}/control_point", [ahead, 0.0, 0.0])
+    for k in _sensors(robot, own):
+        pose_BU = sensor_pose(robot, k).tolist()
+        yield _transform(time, base, f"{name}/sensor_{k + 1}", pose_BU)
 
 
 def _robot_entries(
@@ -192,25 +192,25 @@ def _robot_entries(
     for topic, keys in _POSES.items():
         told.update(keys)
         at = [float(own[key][tick]) for key in keys]
-        yield f"/{name}/{topic}", "geometry_msgs/PoseStamped", stamped_pose(time, at)
+        yield f"/{name}/{topic}", "geometry_msgs/PoseStamped", _stamped_pose(time, at)
     told.update(_VELOCITY)
     vx, vy, omega = (float(own[key][tick]) for key in _VELOCITY)
-    twist = {"linear": vector(vx, vy), "angular": vector(z=omega)}
-    message = stamped(time, WORLD_FRAME, twist=twist)
+    twist = {"linear": _vector(vx, vy), "angular": _vector(z=omega)}
+    message = _stamped(time, WORLD_FRAME, twist=twist)
     yield f"/{name}/velocity", "geometry_msgs/TwistStamped", message
     if all(key in own for key in _ESTIMATE):
         told.update(_ESTIMATE[:2])
         x, y, valid = (float(own[key][tick]) for key in _ESTIMATE)
         if valid > 0.5:
-            message = stamped(time, WORLD_FRAME, point=vector(x, y))
+            message = _stamped(time, WORLD_FRAME, point=_vector(x, y))
             yield f"/{name}/source_estimate", "geometry_msgs/PointStamped", message
-    for k in range(1, _sensors(robot) + 1):
-        if f"range_{k}" in own:
-            told.update((f"range_{k}", f"echo_{k}"))
-            echo = own[f"echo_{k}"][tick] > 0.5
-            distance = float(own[f"range_{k}"][tick]) if echo else math.inf
-            message = _range(name, k, robot, time, distance)
-            yield f"/{name}/range_{k}", "sensor_msgs/Range", message
+    for k in _sensors(robot, own):
+        column = f"range_{k + 1}"
+        told.update((column, f"echo_{k + 1}"))
+        echo = own[f"echo_{k + 1}"][tick] > 0.5
+        distance = float(own[column][tick]) if echo else math.inf
+        message = _range(name, k, robot, time, distance)
+        yield f"/{name}/{column}", "sensor_msgs/Range", message
     for key, values in own.items():
         value = float(values[tick])
         if key not in told and math.isfinite(value):
@@ -220,10 +220,10 @@ def _robot_entries(
 def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Message:
     """Returns a range message. Without an echo, the range is infinite."""
     assert isinstance(robot, HasRangeSensors)
-    sensor = robot.ultrasonic.sensors[k - 1]
-    return stamped(
+    sensor = robot.ultrasonic.sensors[k]
+    return _stamped(
         time,
-        f"{name}/sensor_{k}",
+        f"{name}/sensor_{k + 1}",
         radiation_type=0,
         field_of_view=2.0 * math.radians(sensor.beam_half_angle_deg),
         min_range=sensor.minimum_range_m,
@@ -231,3 +231,105 @@ def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Mes
         range=distance,
         variance=sensor.noise_m**2,
     )
+
+
+def _body_markers(
+    bodies: Mapping[str, Thing], room: RoomParameters | None, names: Mapping[str, str]
+) -> list[Message]:
+    """Returns one ``Marker`` message per body in its frame, and one for the walls."""
+    markers = []
+    for name, body in bodies.items():
+        frame = names[name]
+        match body.shape:
+            case RobotBody(parameters=own):
+                size = own.length_m, own.width_m, ROBOT_HEIGHT_M
+                markers.append(_box(f"{frame}/base_link", "robots", size, "robot"))
+            case SourceBody(length, width, is_body=True):
+                size = length, width, BODY_HEIGHT_M
+                markers.append(_box(frame, "sources", size, "source"))
+            case Box() as size:
+                markers.append(_box(frame, "obstacles", size, "obstacle"))
+    if room is not None:
+        markers.append(_edges(room))
+    return [{**marker, "id": number} for number, marker in enumerate(markers)]
+
+
+def _box(
+    frame: str, group: str, size: tuple[float, float, float], colour: str
+) -> Message:
+    at = _pose((0.0, 0.0, 0.0), 0.5 * size[2])
+    return _marker(frame, group, _CUBE, colour, at, _vector(*size))
+
+
+def _edges(room: RoomParameters) -> Message:
+    """Returns a marker with the edges of a room, as pairs of end points."""
+    low = np.array([*room.corner, 0.0])
+    corners = [low + np.array(room.size_m) * k for k in np.ndindex(2, 2, 2)]
+    ends = [
+        _vector(*end.tolist())
+        for a in range(8)
+        for b in range(a)
+        if (a ^ b).bit_count() == 1
+        for end in (corners[a], corners[b])
+    ]
+    at, wide = _pose((0.0, 0.0, 0.0)), _vector(_EDGE_M)
+    return _marker(WORLD_FRAME, "room", _LINE_LIST, "empty", at, wide, points=ends)
+
+
+def _marker(
+    frame: str,
+    group: str,
+    kind: int,
+    colour: str,
+    at: Message,
+    scale: Message,
+    **others: Any,
+) -> Message:
+    red, green, blue = to_rgb(COLOURS[colour])
+    return _stamped(
+        0.0,
+        frame,
+        ns=group,
+        type=kind,
+        action=_ADD,
+        pose=at,
+        scale=scale,
+        color={"r": red, "g": green, "b": blue, "a": 0.8},
+        frame_locked=True,
+        **others,
+    )
+
+
+def _stamped(time: float, frame: str, **fields: Any) -> Message:
+    """Returns a message with a header, with the time in s and the name of its frame."""
+    sec, nanosec = divmod(round(1e9 * time), 10**9)
+    stamp = {"sec": sec, "nanosec": nanosec}
+    return {"header": {"stamp": stamp, "frame_id": frame}, **fields}
+
+
+def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
+    """Returns a ``Vector3`` or ``Point`` message, in any unit."""
+    return {"x": x, "y": y, "z": z}
+
+
+def _turn(theta: float) -> Message:
+    """Returns the quaternion of a rotation about z by an angle, rad."""
+    return {**_vector(z=math.sin(0.5 * theta)), "w": math.cos(0.5 * theta)}
+
+
+def _pose(at: Sequence[float], height_m: float = 0.0) -> Message:
+    """Returns a ``Pose`` message of a pose (x, y, theta), m and rad."""
+    x, y, theta = at
+    return {"position": _vector(x, y, height_m), "orientation": _turn(theta)}
+
+
+def _stamped_pose(time: float, at: Sequence[float]) -> Message:
+    """Returns a ``PoseStamped`` message of a pose (x, y, theta) in W, m and rad."""
+    return _stamped(time, WORLD_FRAME, pose=_pose(at))
+
+
+def _transform(time: float, parent: str, child: str, at: Sequence[float]) -> Message:
+    """Returns a ``TransformStamped`` message with the pose of a child in its parent."""
+    x, y, theta = at
+    placed = {"translation": _vector(x, y), "rotation": _turn(theta)}
+    return _stamped(time, parent, child_frame_id=child, transform=placed)

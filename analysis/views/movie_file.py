@@ -27,14 +27,10 @@ _CODECS = ("libx264", "aac")
 
 
 class MovieFile:
-    """Output file of a movie. The constructor checks that the file can be written.
+    """Output file of a movie, which ends in .gif or .mp4 and must not exist.
 
-    Args:
-        path: Path that ends in .gif or .mp4. The directory must exist, but the file
-            must not exist.
-
-    Raises:
-        InputError: The file cannot be written, or no encoder is installed.
+    The constructor raises an InputError if the file cannot be written, or if no encoder
+    is installed. The directory of the file must exist.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -62,20 +58,14 @@ class MovieFile:
         return bool(self._ffmpeg)
 
     def write(
-        self,
-        frames: Iterable[NDArray[np.uint8]],
-        sound: Path | None = None,
+        self, frames: Iterable[NDArray[np.uint8]], sound: Path | None = None
     ) -> None:
         """Encodes frames of equal size, and writes the file.
 
-        Args:
-            frames: (rows, columns, 3) red, green and blue values of each frame.
-            sound: Sound file with one channel per microphone, the leftmost microphone
-                first. The two outer microphones become the left and the right channel.
-                With None, the movie is silent.
-
-        Raises:
-            RunError: The encoder fails, or the file cannot be written.
+        A frame has (rows, columns, 3) red, green and blue values. The sound file has
+        one channel per microphone, the leftmost microphone first. The two outer
+        microphones become the left and the right channel. The function raises a
+        RunError if the encoder fails, or if the file cannot be written.
         """
         handle, partial = tempfile.mkstemp(
             prefix=".movie.", suffix=self.path.suffix, dir=self.path.parent
@@ -161,11 +151,7 @@ def _stereo(sound: Path) -> str:
 
 
 def _find_ffmpeg() -> str:
-    """Returns the path of the ffmpeg program that encodes MP4 files.
-
-    Raises:
-        InputError: The program is not installed, or lacks a codec.
-    """
+    """Returns the path of an ffmpeg program that has all codecs."""
     program = shutil.which("ffmpeg")
     if importlib.util.find_spec("imageio_ffmpeg") is not None:
         import imageio_ffmpeg

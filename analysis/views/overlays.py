@@ -91,15 +91,7 @@ class Disc(NamedTuple):
 
 
 def overlays(scene: Scene, times: NDArray[np.float64]) -> list[Layer]:
-    """Makes the layers that only a replay shows.
-
-    Args:
-        scene: Scene of the run.
-        times: (n,) times of the frames of the replay, s.
-
-    Returns:
-        Layers with things on the robots, and things in the world frame W.
-    """
+    """Makes the layers that only a replay shows, for the times of its frames, s."""
     return [
         *_laws(scene),
         *_guards(scene),
@@ -110,17 +102,11 @@ def overlays(scene: Scene, times: NDArray[np.float64]) -> list[Layer]:
 
 
 def scale_m_n(result: RunResult) -> float | None:
-    """Returns the length of an arrow for a force of 1 N.
+    """Returns the length, m, of an arrow for a force of 1 N: 1, 2 or 5 times 10^k.
 
     With this length, the arrow of the greatest force is at most 0.8 m long. The
-    greatest force is the 99th percentile of all forces in the run.
-
-    Args:
-        result: Result of the run, for one robot or several robots.
-
-    Returns:
-        Length, m. The value is 1, 2 or 5 times a power of ten. It is None if no control
-        law logs its forces.
+    greatest force is the 99th percentile of all forces in the run. The length is None
+    if no control law logs its forces.
     """
     sizes = [
         np.hypot(*own.vector(name))
@@ -137,13 +123,9 @@ def scale_m_n(result: RunResult) -> float | None:
 
 
 def commanded_velocity(own: RunResult) -> NDArray[np.float64]:
-    """Returns the velocity of the control point P that the wheel commands would cause.
+    """Returns the velocity of P that the wheel commands of one robot would cause.
 
-    Args:
-        own: Result of a run, for one robot.
-
-    Returns:
-        (n, 2) velocity in W at the ticks, m/s.
+    P is the control point. The result has the shape (n, 2), in W, m/s.
     """
     robot, theta = own.scenario.only.robot, own.columns["theta_WB"]
     left = robot.wheel_radius_m * own.columns["wheel_speed_left"]
@@ -205,10 +187,7 @@ def _arrow(
 
 
 def _guards(scene: Scene) -> Iterator[Layer]:
-    """Yields the edge of the disc that each safety guard keeps free.
-
-    If the robot braked now, its axle would stop at the center of the disc.
-    """
+    """Yields the edge of the disc that each guard keeps free where the robot stops."""
     things = []
     for name, own in scene.result.robots.items():
         motion = guarded_motion(own)
@@ -233,10 +212,7 @@ def _guards(scene: Scene) -> Iterator[Layer]:
 
 
 def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
-    """Yields a ring around each body that a control law takes as moving.
-
-    The radius of the ring shows the uncertainty of the position.
-    """
+    """Yields a ring per tracked body; its radius is the uncertainty of the position."""
     things, colour, plans = [], COLOURS["tracked"], False
     for name, own in scene.result.robots.items():
         tracked = tracked_bodies(own, times)
@@ -273,11 +249,7 @@ def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
 
 
 def _lamps(scene: Scene) -> Iterator[Layer]:
-    """Yields a lamp above each searching robot, and a flash for each radio frame.
-
-    The flash is for radio frames that the sink receives. The sink is the computer of
-    the operator.
-    """
+    """Yields a lamp above each searcher, and flashes for radio frames at the sink."""
     things = []
     for name, own in scene.result.robots.items():
         if own.scenario.only.searches is None:

@@ -56,25 +56,12 @@ CONE_INSTANTS = 4
 
 
 def plot_trajectory(result: RunResult) -> Figure:
-    """Draws the run from above, in the world frame W.
+    """Draws the run from above at a few times, in the world frame W.
 
-    At a few times, the picture shows:
-
-    - the rectangle of the robot with its microphone bar
-    - the source and the moving obstacles
-    - the cones of the range sensors, up to the range readings
-
-    Labels show the times. With ideal obstacle sensing, there are no cones. For a robot
-    with a safety guard, the floor that the robot knew at the end replaces the cones.
-
-    Crosses show the source positions that the robot estimated. Early estimates are
-    faint, and late estimates are strong.
-
-    Args:
-        result: Result of the run.
-
-    Returns:
-        Picture with axes in m.
+    With ideal obstacle sensing, there are no cones. For a robot with a safety guard,
+    the floor that the robot knew at the end replaces the cones. Crosses show the source
+    positions that the robot estimated. Early estimates are faint, and late estimates
+    are strong.
     """
     figure, axes = map_axes(result)
     draw_grid(axes)
@@ -95,17 +82,10 @@ def plot_trajectory(result: RunResult) -> Figure:
 
 
 def map_axes(result: RunResult) -> tuple[Figure, Axes]:
-    """Makes axes with equal scales that show all bodies, with space for a legend below.
+    """Makes axes in W, m, with equal scales for all bodies, and space for a legend.
 
     The aspect ratio of the axes is limited. If necessary, the axes show more of the
     floor.
-
-    Args:
-        result: Result of the run.
-
-    Returns:
-        Two values. The first value is the figure. The second value is its axes, in the
-        world frame W, m.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
     width = WIDTH_IN - LEFT_IN - RIGHT_IN
@@ -128,13 +108,10 @@ def map_axes(result: RunResult) -> tuple[Figure, Axes]:
 
 
 def draw_scene(axes: Axes, scene: Scene, *, ends_only: bool = False) -> None:
-    """Draws a run from above.
+    """Draws a run from above into axes in the world frame W, m.
 
-    Args:
-        axes: Axes in the world frame W, m.
-        scene: Scene of the run.
-        ends_only: Whether robots are drawn only at the start and at the end of the run.
-            Then the picture shows neither what the robots sensed nor the odor.
+    If ``ends_only`` is true, robots are drawn only at the start and at the end of the
+    run. Then the picture shows neither what the robots sensed nor the odor.
     """
     painter = _Painter(axes, scene, ends_only)
     for kind, draw in _DRAW.items():

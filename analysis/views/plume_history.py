@@ -29,15 +29,9 @@ class PlumeInstant(NamedTuple):
 
 
 def plume_history(scenario: Scenario, end_s: float) -> Iterator[PlumeInstant]:
-    """Recomputes the ports ``wind`` and ``plume`` of a run at intervals of 0.1 s.
+    """Yields the ports ``wind`` and ``plume`` of a run every 0.1 s, from 0 on.
 
-    Args:
-        scenario: Scenario of the run, with an odor source.
-        end_s: Last instant, s.
-
-    Yields:
-        Wind and plume at each instant, starting at 0. If the scenario has no plume,
-        there are no instants.
+    If the scenario has no plume, there are no instants.
     """
     blocks = world_blocks(scenario, world_seeds(scenario))
     if "plume" not in blocks:
@@ -57,14 +51,8 @@ def plume_history(scenario: Scenario, end_s: float) -> Iterator[PlumeInstant]:
 def concentration_map(
     plume: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Computes the concentration of the odor on a grid.
+    """Computes the (m, n) concentrations of the odor at (n,) x and (m,) y in W, m.
 
-    Args:
-        plume: Values of the port ``plume``.
-        x: (n,) x of the grid points in the world frame W, m.
-        y: (m,) y of the grid points in W, m.
-
-    Returns:
-        (m, n) concentrations, in units of C1, the constant of the gas sensors.
+    The unit of the concentration is C1, the constant of the gas sensors.
     """
     return np.array([[concentration(plume, u, v) for u in x] for v in y])

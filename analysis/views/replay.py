@@ -93,46 +93,8 @@ def write_replay(
 ) -> None:
     """Writes a self-contained page that plays the run in three dimensions.
 
-    The scene shows:
-
-    - each robot with its wheels, its microphone bar, and the cones of its range sensors
-    - the obstacles, the walls of the room, and trails of past positions
-    - each source, with a ring that grows while the source sounds
-    - a ball at the source position that each robot estimates
-    - arrows for the forces of the control law and for the commanded motion
-    - a touched object in red, with a star at the point of contact
-
-    A cone is brown while its sensor has an echo.
-
-    For a robot with a safety guard, the scene also shows the floor that the robot knows
-    to be free. Dots show where echoes came from. A circle shows the area that the guard
-    keeps free. The center of the circle is the position at which the robot would come
-    to rest if it braked now. The color of the circle shows the action of the guard:
-
-    - gray: the guard passes the command of the law
-    - orange: the guard reduces the command
-    - red: the guard brakes
-
-    For the guarded law, the scene also shows a ring around each body that the robot
-    takes as moving. The radius of the ring is the uncertainty of the position. For a
-    search, the scene also shows the container of the odor source, discs for puffs of
-    the plume, a lamp above each robot, and a white flash for each of its radio frames
-    that the operator's computer receives.
-
-    Around the scene, the page has a clock, a legend with switches for its layers, the
-    warnings about the scenario, and curves over time. If the address ends with
-    ``#t=2.5``, the replay begins at 2.5 s. The page needs a browser with WebGL, but no
-    network.
-
-    Args:
-        result: Result of the run.
-        path: The .html file.
-        clearance: (n,) distance from each robot to the nearest body at the ticks
-            (control periods), m, by name of the robot. The page shows these distances
-            as curves. A robot without an entry has no such curve.
-
-    Raises:
-        OSError: The file cannot be written.
+    docs/runs.md and docs/searches.md explain what the page shows. ``clearance`` has the
+    distances of ``page_charts``. The page needs a browser with WebGL, but no network.
     """
     scene = make_scene(result)
     layers = [*scene.layers, *overlays(scene, frame_times(result))]
@@ -484,11 +446,7 @@ class _Recorder:
                 self.switch(path, known.times, states)
 
     def _plume(self, thing: Thing, shape: Plume) -> None:
-        """Adds the container of the odor source, and discs for puffs of the plume.
-
-        Each disc shows the puff that is nearest to the distance of this disc from the
-        source.
-        """
+        """Adds the odor source, and discs for the puffs nearest to their distances."""
         purple, height = "#993380", 0.12
         box, middle = Block(*CONTAINER_M, height), _placed(0.0, 0.0, 0.5 * height)
         self.put(f"{thing.path}/container", box, purple, middle)
@@ -525,10 +483,7 @@ class _Recorder:
 def _nearest(
     puffs: NDArray[np.float64], away: NDArray[np.float64], distance: float
 ) -> tuple[float, float, float]:
-    """Returns x, y and size of the puff nearest to a distance from the source, m.
-
-    The values are NaN if no puff is within ``_APART_M`` of the distance.
-    """
+    """Returns x, y and size of the puff nearest to a distance, m; NaN without one."""
     if len(away):
         k = int(np.abs(away - distance).argmin())
         if abs(away[k] - distance) < _APART_M:

@@ -27,14 +27,8 @@ def replay_page(
 ) -> str:
     """Returns the page of Meshcat (Drake's 3D viewer) with added controls and charts.
 
-    Args:
-        meshcat_page: HTML text from ``Meshcat.StaticHtml``.
-        scene: Scene of the run.
-        layers: Entries of the legend.
-        charts: Curves over time, from ``page_charts``.
-
-    Returns:
-        HTML text of a page that needs no network.
+    ``meshcat_page`` is from ``Meshcat.StaticHtml``. The layers are the entries of the
+    legend. The charts are from ``page_charts``. The page needs no network.
     """
     result = scene.result
     data = {
@@ -133,10 +127,8 @@ def _panels(
 def _entry(layer: Layer) -> str:
     parts = "".join(f'<i style="background:{colour}"></i>' for colour in layer.colours)
     swatch = f'<span class="swatch">{parts}</span>'
-    label, small = (
-        html.escape(layer.label),
-        f"<small>{html.escape(layer.meaning)}</small>",
-    )
+    label = html.escape(layer.label)
+    small = f"<small>{html.escape(layer.meaning)}</small>"
     if not layer.switched:
         return f"<li>{swatch}{label}{small if layer.meaning else ''}</li>"
     paths = html.escape(json.dumps(_hidden(layer)))

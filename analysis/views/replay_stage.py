@@ -23,10 +23,6 @@ def add_floor(meshcat: Meshcat, result: RunResult) -> None:
 
     The labels are at the near edge of the initial view. The floor extends beyond this
     edge.
-
-    Args:
-        meshcat: Scene of the replay.
-        result: Result of the run.
     """
     x_low, x_high, y_low, y_high = floor_rectangle(result)
     x, y = (x_low + x_high) / 2.0, (y_low + y_high) / 2.0
@@ -49,11 +45,7 @@ def add_floor(meshcat: Meshcat, result: RunResult) -> None:
 
 
 def set_stage(meshcat: Meshcat) -> None:
-    """Sets even light and a plain background. The page of the replay chooses the view.
-
-    Args:
-        meshcat: Scene of the replay.
-    """
+    """Sets even light and a plain background. The page chooses the view."""
     lamps = ("SpotLight", "PointLightNegativeX", "PointLightPositiveX")
     for path in ("/Grid", "/Axes", *(f"/Lights/{lamp}" for lamp in lamps)):
         meshcat.SetProperty(path, "visible", value=False)

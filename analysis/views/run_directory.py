@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,14 +10,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.reporting.plain_values import write_json
+from analysis.reporting.render import heading, html, page
+from analysis.reporting.section import (
+    Content,
+    Definitions,
+    Files,
+    Note,
+    Picture,
+    Section,
+    Table,
+)
+from analysis.runs.metric_table import METRICS
 from analysis.runs.proximity import Proximity
 from analysis.runs.run_report import summary_rows
 from analysis.views.block_diagram import write_block_diagram
+from analysis.views.framing import run_title
 from analysis.views.picture import plot_trajectory
 from analysis.views.replay import write_replay
-from analysis.views.run_page import run_page
 from analysis.views.time_series import plot_time_series
 from diagrams import RunResult, build_sound_follower, write_scenario
+
+#: Other files in the directory of the page, and their contents.
+_FILES = {
+    "replay.html": "the run in three dimensions, with curves over time",
+    "trajectory.parquet": "one row per tick, SI units",
+    "scenario.yaml": "all inputs of the run; `phonotaxis simulate` runs it again",
+    "summary.json": "the numbers of this page, for programs",
+}
 
 
 def write_run(
@@ -26,27 +46,11 @@ def write_run(
     *,
     pictures: bool = True,
 ) -> None:
-    """Writes all files of a run into an existing directory.
-
-    The files are:
-
-    - ``scenario.yaml``: the complete scenario, which can be run again
-    - ``scenario.schema.json``: the schema of this scenario file
-    - ``summary.json``: the summary
-    - ``trajectory.parquet``: the table with one row per tick (control period)
-    - ``replay.html``: the replay in three dimensions
-    - ``trajectory.png``, ``time_series.png`` and ``diagram.svg``: the pictures
-    - ``report.html``: a page with the pictures, and with links to other files
+    """Writes all files of a run into an existing directory; docs/runs.md lists them.
 
     With several robots, each robot has its own ``time_series_<name>.png`` and
     ``diagram_<name>.svg``. The file ``diagram.svg`` then shows how the robots are
     connected.
-
-    Args:
-        result: Result of the run.
-        summary: Summary of the run, from ``run_document``.
-        directory: Existing directory.
-        pictures: Whether to write the PNG and SVG files.
     """
     write_scenario(result.full_scenario, directory)
     write_json(summary, directory / "summary.json")
@@ -57,7 +61,7 @@ def write_run(
     write_replay(result, directory / "replay.html", clearance)
     rows = summary_rows(result, summary)
     (directory / "report.html").write_text(
-        run_page(result, rows, summary, directory), "utf-8"
+        _page(result, rows, summary, directory), "utf-8"
     )
 
 
@@ -77,3 +81,101 @@ def _write_pictures(
     if result.several:
         for name, parts in follower.robots.items():
             write_block_diagram(parts.diagram, directory / f"diagram_{name}.svg")
+
+
+def _page(
+    result: RunResult,
+    rows: Mapping[str, str],
+    summary: Mapping[str, Any],
+    directory: Path,
+) -> str:
+    """Returns the page of a run; it shows only files that are in the directory."""
+
+    def there(name: str) -> bool:
+        return (directory / name).is_file()
+
+    parts: dict[str, Sequence[Content]] = {
+        "Summary": _summary(result, rows, has_replay=there("replay.html"))
+    }
+    if there("trajectory.png"):
+        caption = "The run from above, in W. Times are in seconds."
+        parts["From above"] = [Picture("trajectory.png", caption)]
+    whose = {f"_{name}": f": {name}" for name in result.several} or {"": ""}
+    for title, file, text, owners in (
+        ("Over time", "time_series{}.png", "Sensors and commands over time", whose),
+        ("Blocks", "diagram{}.svg", "Blocks and their connections", {"": "", **whose}),
+    ):
+        shown = [
+            Picture(file.format(ending), f"{text}{who}.")
+            for ending, who in owners.items()
+            if there(file.format(ending))
+        ]
+        if shown:
+            parts[title] = shown
+    parts["Figures"] = _figures(result, summary)
+    files = [(name, text) for name, text in _FILES.items() if there(name)]
+    parts["Files"] = [Files(files)]
+    contents = [(_anchor(title), title) for title in parts]
+    sections = [
+        html(Section(_anchor(title), title, inner), _anchor(title))
+        for title, inner in parts.items()
+    ]
+    return page(run_title(result), contents, sections)
+
+
+def _anchor(title: str) -> str:
+    return title.lower().replace(" ", "-")
+
+
+def _summary(
+    result: RunResult, rows: Mapping[str, str], *, has_replay: bool
+) -> list[Content]:
+    """Returns the warnings and the summary, with a list of rows per robot."""
+    begin = 0
+    parts: list[Content] = [
+        Note(f"Warning: `{x.field}`: {x.message}") for x in result.warnings
+    ]
+    names = list(rows)
+    starts = [names.index(name) for name in result.several]
+    for end in [*starts, len(names)]:
+        own = names[begin:end]
+        if begin in starts:
+            parts.append(heading(own[0]))
+        shown = [
+            (
+                "Ended" if name in result.several else name.split(".")[-1].capitalize(),
+                rows[name],
+            )
+            for name in own
+        ]
+        parts.append(Definitions(shown))
+        begin = end
+    if has_replay:
+        watch = [("replay.html", "the whole run as an animation")]
+        if result.collision is not None:
+            moment = max(result.collision.time - 1.0, 0.0)
+            watch.append(
+                (f"replay.html#t={moment:.2f}", "one second before the collision")
+            )
+        parts.append(Files(watch))
+    return parts
+
+
+def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[Content]:
+    """Returns a table with one row per metric and one column per robot."""
+    metrics: Mapping[str, Any] = summary["metrics"]
+    prefixes = [f"{name}." for name in result.several] or [""]
+    found = [
+        metric
+        for metric in METRICS.values()
+        if any(f"{prefix}{metric.name}" in metrics for prefix in prefixes)
+    ]
+    rows = [
+        [
+            metric.label,
+            *(metrics.get(f"{prefix}{metric.name}") for prefix in prefixes),
+        ]
+        for metric in found
+    ]
+    text = "docs/metrics.md defines each metric."
+    return [text, Table(["", *(result.several or [""])], rows)]

@@ -203,14 +203,7 @@ class Scene:
 
 
 def make_scene(result: RunResult) -> Scene:
-    """Makes the scene of a run.
-
-    Args:
-        result: Result of the run, for one robot or several robots.
-
-    Returns:
-        Scene with poses at the ticks (control periods) of the run.
-    """
+    """Makes the scene of a run, with poses at its ticks (control periods)."""
     scenario = result.full_scenario
     robots = {name: own.poses("WB") for name, own in result.robots.items()}
     found = scene_bodies(scenario, result.time, robots)
@@ -234,15 +227,10 @@ def scene_bodies(
     times: NDArray[np.float64],
     robots: Mapping[str, NDArray[np.float64]],
 ) -> dict[str, Thing]:
-    """Makes the bodies of a scene.
+    """Makes the robots, sources and obstacles of a scene, by name.
 
-    Args:
-        scenario: Scenario with all robots.
-        times: (n,) ascending times, s.
-        robots: (n, 3) pose of each robot in W at the times, m and rad, by its name.
-
-    Returns:
-        Robots, sources and obstacles, by name.
+    The (n,) times are ascending, s. At the times, each robot has (n, 3) poses in W, m
+    and rad.
     """
     found = {}
     several, tints = len(robots) > 1, _robot_colours(scenario)
@@ -401,14 +389,9 @@ def _logged_sensors(result: RunResult) -> range:
 
 
 def sensor_pose(robot: Robot, sensor: int) -> NDArray[np.float64]:
-    """Returns the pose of a range sensor in the robot frame B.
+    """Returns x, y, theta of a range sensor in the robot frame B, m and rad.
 
-    Args:
-        robot: Robot with range sensors.
-        sensor: Number of the sensor, from 0.
-
-    Returns:
-        (3,) x, y, theta of the sensor frame U in B, m and rad.
+    The first sensor has the number 0.
     """
     assert isinstance(robot, HasRangeSensors)
     own = robot.ultrasonic.sensors[sensor]

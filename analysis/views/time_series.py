@@ -24,23 +24,11 @@ LONGEST_LINE = 13
 
 
 def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> Figure:
-    """Draws measured, estimated and commanded quantities over time.
+    """Draws measured, estimated and commanded quantities of one robot over time.
 
-    Bursts of the source are shaded.
-
-    Args:
-        result: Result of a run, for one robot.
-        clearance: (n,) distance from the robot to the nearest body at each tick
-            (control period), m (``analysis.runs.proximity``). With None, the picture
-            has no panel of the clearance.
-
-    Returns:
-        Picture with one panel per quantity. If the robot has a safety guard, one panel
-        shows the actions of the guard. Another panel shows the distance that the robot
-        has to spare.
-
-    Raises:
-        InputError: ``clearance`` does not have one value per tick.
+    Bursts of the source are shaded. The clearance is that of ``panels``. If the robot
+    has a safety guard, one panel shows the actions of the guard. Another panel shows
+    the distance that the robot has to spare.
     """
     shown, bursts = panels(result, clearance), heard_bursts(result)
     size = WIDTH_IN, 1.0 + PANEL_IN * len(shown)

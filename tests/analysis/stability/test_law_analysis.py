@@ -12,8 +12,11 @@ from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import Part, analyse_law
 from analysis.stability.linear_parts import OPERATING_POINTS
 from analysis.stability.margin_parts import MARGINS
-from analysis.stability.report_files import stability_document, stability_text
-from analysis.stability.report_page import stability_page
+from analysis.stability.report_files import (
+    stability_document,
+    stability_page,
+    stability_text,
+)
 from diagrams import load_scenario
 from docs.building.page_code import page_file
 from systems.framework.input_error import InputError

@@ -7,8 +7,11 @@ import pytest
 from analysis.models.ideal_scenarios import ideal_scenario, require_ideal
 from analysis.stability.choice import chosen_laws, chosen_robot
 from analysis.stability.law_analysis import analyse_law
-from analysis.stability.report_files import stability_document, stability_text
-from analysis.stability.report_page import stability_page
+from analysis.stability.report_files import (
+    stability_document,
+    stability_page,
+    stability_text,
+)
 from analysis.stability.report_parts import parts_for
 from diagrams import load_scenario
 from systems.framework.input_error import InputError

@@ -9,8 +9,7 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Gain, LogVectorOutput
 
-from analysis.views.block_diagram import block_svg, write_block_diagram
-from analysis.views.wires import Wire, wires
+from analysis.views.block_diagram import Wire, block_svg, wires, write_block_diagram
 from diagrams import build_sound_follower, load_scenario
 
 pytestmark = pytest.mark.drake

@@ -34,7 +34,7 @@ from studies.linear.root_locus import root_loci
 from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import analyse_law
 from analysis.stability.model_sheet import model_sheet
-from analysis.stability.report_page import stability_page
+from analysis.stability.report_files import stability_page
 from diagrams import build_sound_follower, load_scenario
 from diagrams.scenario.fields.shipped import SCHEMA_FILE
 from tools.scenario_schema import make_schema, schema_file_text
