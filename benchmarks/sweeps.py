@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from analysis.sweeps.one_run import Task, run_task
 from analysis.sweeps.plan import SweepPlan
-from analysis.sweeps.sweep import run_sweep
+from analysis.sweeps.sweep import prepare_sweep
 from benchmarks.process_tree import tree_usage
 from diagrams import simulate
 from diagrams.scenario.run_parameters import Engine
@@ -65,7 +65,7 @@ def trace_sweep(plan: SweepPlan, workers: int, *, every: int) -> SweepTrace:
             rows.append((done, perf_counter(), usage.processor_s, usage.resident_mb))
 
     with TemporaryDirectory() as folder:
-        run_sweep(plan, Path(folder) / "out", workers=workers, progress=look)
+        prepare_sweep(plan, Path(folder) / "out", workers=workers).run(look)
     return SweepTrace(*np.array(rows).T)
 
 

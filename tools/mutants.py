@@ -42,7 +42,8 @@ MODULES = (
     "analysis/arrays/*.py",
     "analysis/reporting/criterion.py",
     "analysis/reporting/intervals.py",
-    "analysis/runs/metrics.py",
+    "analysis/runs/measured_run.py",
+    "analysis/runs/metric_table.py",
     "analysis/runs/proximity.py",
     "analysis/runs/shortest_path.py",
     "analysis/runs/smoothness.py",
@@ -51,7 +52,6 @@ MODULES = (
     "studies/support/claim_judges.py",
     "studies/claims.py",
     "analysis/sweeps/cells.py",
-    "analysis/sweeps/mechanisms.py",
     "analysis/sweeps/pairs.py",
 )
 #: Operators whose mutants do not run, or mean the same.

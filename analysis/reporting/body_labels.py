@@ -38,14 +38,11 @@ _Box = tuple[float, float, float, float]
 class BodyLabel(Annotation):
     """Text label of a rectangular body; ``spread_labels`` finds its final position."""
 
-    def __init__(self, text: str, rectangle: ArrayLike, colour: str) -> None:
+    def __init__(self, text: str, rectangle: ArrayLike, color: str) -> None:
         """Places the label at the right side of the body.
 
-        Args:
-            text: One line of text.
-            rectangle: (5,) body as (x, y, theta, length, width) in the world frame W, m
-                and rad.
-            colour: Color of the body. The text gets the same color, darkened if needed.
+        The body is (x, y, theta, length, width) in the world frame W, m and rad. The
+        text gets the color of the body, darkened if needed.
         """
         x, y, theta, length, width = map(float, np.asarray(rectangle))
         unit = math.sin(theta), -math.cos(theta)
@@ -55,7 +52,7 @@ class BodyLabel(Annotation):
             (x + 0.5 * width * unit[0], y + 0.5 * width * unit[1]),
             xytext=(9.0 * unit[0], 7.0 * unit[1]),
             textcoords="offset points",
-            color=text_colour(colour),
+            color=text_colour(color),
             fontsize=8,
             ha="center",
             va="center",
@@ -74,11 +71,9 @@ class BodyLabel(Annotation):
 def spread_labels(axes: Axes) -> None:
     """Moves all labels to places where they cover as little of the picture as possible.
 
-    A label covers another label only if there is no other place. If a label is 8 points
-    or more away from its body, a thin line connects the two.
-
-    Args:
-        axes: Axes with the complete drawing. Their limits must be final.
+    The drawing must be complete, and the limits of the axes final. A label covers
+    another label only if there is no other place. If a label is 8 points or more away
+    from its body, a thin line connects the two.
     """
     figure = axes.get_figure(root=True)
     assert figure is not None
@@ -100,14 +95,9 @@ def spread_labels(axes: Axes) -> None:
             step = (turn + 1) // 2 * (1 if turn % 2 else -1)
             angle = theta - math.pi / 2.0 + 2.0 * math.pi * step / _DIRECTIONS
             unit = np.array([math.cos(angle), math.sin(angle)])
-            body = (
-                0.5
-                * along
-                * (
-                    length * abs(math.cos(angle - theta))
-                    + width * abs(math.sin(angle - theta))
-                )
-            )
+            sides = length * abs(math.cos(angle - theta))
+            sides += width * abs(math.sin(angle - theta))
+            body = 0.5 * along * sides
             reach = body + float(half @ np.abs(unit))
             for gap in _GAPS_PT:
                 place = middle + (reach + gap) * unit
@@ -132,8 +122,8 @@ def spread_labels(axes: Axes) -> None:
         if gap >= _LEAD_FROM_PT:
             ends = np.array([middle + body * unit, place - _to_edge(half, unit)])
             where = axes.transData.inverted().transform(ends / scale)
-            colour = label.get_color()
-            line = Line2D(*where.T, color=colour, lw=0.6, zorder=6.9, gid="leader")
+            color = label.get_color()
+            line = Line2D(*where.T, color=color, lw=0.6, zorder=6.9, gid="leader")
             axes.add_line(line)
 
 

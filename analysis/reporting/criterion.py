@@ -111,9 +111,7 @@ def shown_value(value: float | None, unit: str) -> float | str | None:
     return "yes" if value else "no"
 
 
-def compare_verdicts(
-    by_law: Mapping[str, Sequence[Verdict]],
-) -> tuple[VerdictRow, ...]:
+def compare_verdicts(by_law: Mapping[str, Sequence[Verdict]]) -> tuple[VerdictRow, ...]:
     """Puts the verdicts of several laws side by side, in the order of the first law."""
     laws = list(by_law)
     rows = []

@@ -22,20 +22,13 @@ def distinct_names(
 ) -> list[str]:
     """Makes a different file name for each text, as close to the text as possible.
 
-    Two names that differ only in upper and lower case count as equal. The file systems
-    of macOS and Windows also treat them as equal.
+    Names may neither equal each other nor ``taken``, with any of the ``endings``. If a
+    name is taken, the new name is, for example, ``summary-2``, with ``joint`` before
+    the number. Two names that differ only in upper and lower case count as equal, as in
+    the file systems of macOS and Windows.
 
-    Args:
-        wanted: Any texts, chosen by a user.
-        taken: Names of other files in the same folder.
-        endings: Endings of the files that belong to each name.
-        joint: Text between a name and its number. If a name is taken, the new name is,
-            for example, ``summary-2``.
-
-    Returns:
-        One name for each text, in the same order. Hyphens replace characters that some
-        file systems reserve. Dots and spaces at both ends are removed. A name has at
-        most 200 bytes, not counting its number.
+    Hyphens replace characters that some file systems reserve. Dots and spaces at both
+    ends are removed. A name has at most 200 bytes, not counting its number.
     """
     used = {_folded(name) for name in taken}
     names = []

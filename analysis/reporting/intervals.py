@@ -32,16 +32,11 @@ class Estimate:
         return self.low, self.high
 
     def text(self, form: str, *, unit: str = "", factor: float = 1.0) -> str:
-        """Writes the value and its interval for readers.
+        """Writes the value and its interval in the form '12.5 % (3.1, 22.0)'.
 
-        Args:
-            form: Format of all three numbers, for Python's function ``format``. Zeros
-                never have a minus sign.
-            unit: Unit after the value, with a leading space.
-            factor: Factor that multiplies all three numbers before they are written.
-
-        Returns:
-            Text in the form '12.5 % (3.1, 22.0)'; a dash without samples.
+        All three numbers are multiplied by ``factor`` and formatted by ``form``; zeros
+        never have a minus sign. The unit begins with a space. Without samples, the text
+        is a dash.
         """
         if self.n == 0:
             return "-"
@@ -56,18 +51,10 @@ def nothing(level: float = LEVEL) -> Estimate:
 
 
 def estimate_rate(count: int, n: int, *, level: float = LEVEL) -> Estimate:
-    """Estimates a probability from a number of events.
+    """Estimates the probability of an event that ``count`` of ``n`` samples have.
 
     The interval is Wilson's score interval, without continuity correction. Reference:
     Wilson (1927).
-
-    Args:
-        count: Number of samples with the event.
-        n: Number of all samples.
-        level: Confidence level of the interval.
-
-    Returns:
-        The share of the event and its interval, from 0 to 1.
     """
     from scipy.stats import binomtest
 
@@ -80,18 +67,9 @@ def estimate_rate(count: int, n: int, *, level: float = LEVEL) -> Estimate:
 def estimate_mean(
     values: ArrayLike, *, seed: int, level: float = LEVEL, resamples: int = 2000
 ) -> Estimate:
-    """Estimates a mean, with a percentile bootstrap interval.
+    """Estimates the mean of independent samples, with a percentile bootstrap interval.
 
     Reference: Efron (1979).
-
-    Args:
-        values: (n,) independent samples.
-        seed: Seed of the resampling.
-        level: Confidence level of the interval.
-        resamples: Number of resampled sets.
-
-    Returns:
-        The mean and its interval, in the unit of the samples.
     """
     from scipy.stats import bootstrap
 
@@ -114,19 +92,11 @@ def estimate_mean(
 def estimate_median(values: ArrayLike, *, level: float = LEVEL) -> Estimate:
     """Estimates a median, with a confidence interval from order statistics.
 
-    The interval is valid for any distribution of the samples. The number of samples
-    below the true median has a binomial distribution. This distribution determines
-    which two of the sorted samples bound the interval. At a level of 95 %, this needs
-    at least six samples. With fewer samples, the interval extends from the least to the
-    greatest sample.
-
-    Args:
-        values: (n,) independent samples.
-        level: Least confidence level of the interval.
-
-    Returns:
-        The median and its interval, in the unit of the samples. Each end of the
-        interval is one of the samples.
+    The samples are independent. The interval is valid for any distribution of the
+    samples. The number of samples below the true median has a binomial distribution.
+    This distribution determines which two of the sorted samples bound the interval. At
+    a level of 95 %, this needs at least six samples. With fewer samples, the interval
+    extends from the least to the greatest sample.
     """
     # scipy's quantile_test gives the same interval, but takes 15 times as long.
     from scipy.stats import binom

@@ -16,13 +16,5 @@ def markdown_head(headings: Sequence[str]) -> str:
 
 
 def markdown_table(headings: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    """Makes a table in Markdown.
-
-    Args:
-        headings: One heading for each column.
-        rows: Cells of each row from left to right, written with ``str``.
-
-    Returns:
-        Lines of text, without a newline after the last line.
-    """
+    """Makes a table in Markdown, without a newline after the last line."""
     return "\n".join([markdown_head(headings), *map(markdown_row, rows)])

@@ -64,15 +64,10 @@ SERIES_COLOURS = (
 
 
 def luminance(colour: Any) -> float:
-    """Computes the relative luminance of a color, as defined by WCAG 2.2.
+    """Computes the relative luminance of a color: 0 for black, 1 for white (WCAG 2.2).
 
-    If the luminance is below 0.18, white text has more contrast than black text.
-
-    Args:
-        colour: Color in any form of matplotlib. Its transparency is ignored.
-
-    Returns:
-        Luminance from 0 for black to 1 for white.
+    If the luminance is below 0.18, white text has more contrast than black text. The
+    transparency of the color is ignored.
     """
     from matplotlib.colors import to_rgb
 
@@ -86,34 +81,17 @@ def luminance(colour: Any) -> float:
 
 
 def contrast(first: Any, second: Any) -> float:
-    """Computes the contrast ratio of two colors, as defined by WCAG 2.2.
+    """Computes the contrast ratio of two colors, from 1 to 21, as defined by WCAG 2.2.
 
     The ratio is (L1 + 0.05) / (L2 + 0.05), where L1 and L2 are the luminances of the
     lighter and the darker color. The number 0.05 represents stray light.
-
-    Args:
-        first: Color in any form of matplotlib.
-        second: Color in any form of matplotlib.
-
-    Returns:
-        Ratio from 1 to 21.
     """
     less, more = sorted((luminance(first), luminance(second)))
     return (more + 0.05) / (less + 0.05)
 
 
 def text_colour(colour: Any) -> str:
-    """Darkens a color until text in this color is readable on white.
-
-    The required contrast ratio is 4.5 to 1.
-
-    Args:
-        colour: Color in any form of matplotlib.
-
-    Returns:
-        The darkened color. If the color is dark enough, the function returns the color
-        itself.
-    """
+    """Darkens a color, if needed, until its contrast on white is 4.5 to 1."""
     from matplotlib.colors import to_hex, to_rgb
 
     red, green, blue = to_rgb(colour)
@@ -126,15 +104,9 @@ def text_colour(colour: Any) -> str:
 
 
 def faintest(colour: Any) -> float:
-    """Computes the least opacity at which a mark stands out from white.
+    """Computes the least opacity at which a mark has a contrast of 3 to 1 on white.
 
-    The required contrast ratio is 3 to 1.
-
-    Args:
-        colour: Color of the mark in any form of matplotlib.
-
-    Returns:
-        Opacity from 0 to 1. The result is 1 if even the opaque color is too light.
+    The opacity is 1 if even the opaque color is too light.
     """
     from matplotlib.colors import to_rgb
 
@@ -147,11 +119,6 @@ def faintest(colour: Any) -> float:
 
 
 def draw_grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
-    """Draws a faint grid behind all other parts of a picture.
-
-    Args:
-        axes: Axes to draw into.
-        axis: Axis whose tick marks get grid lines.
-    """
+    """Draws a faint grid behind all other parts of a picture."""
     axes.grid(axis=axis, color="#E5E5E5", linewidth=0.6)
     axes.set_axisbelow(True)

@@ -17,7 +17,7 @@ from pydantic import BaseModel
 def plain(value: Any) -> Any:
     """Converts a value to mappings, lists, texts, numbers, truth values and None.
 
-    These types need a conversion:
+    These types need a conversion; any other type raises TypeError:
 
     - An object with a method ``to_dict`` is replaced by the result of this method.
     - Any other dataclass becomes a mapping of its fields. Fields whose names begin with
@@ -27,15 +27,6 @@ def plain(value: Any) -> Any:
     - An infinite number or NaN becomes None, because JSON has no such numbers.
     - A model of pydantic becomes a mapping.
     - A path or an enumeration value becomes a text.
-
-    Args:
-        value: Value to convert.
-
-    Returns:
-        The converted value.
-
-    Raises:
-        TypeError: The value has another type.
     """
     if hasattr(value, "to_dict"):
         value = value.to_dict()
@@ -73,14 +64,6 @@ def pick(value: Any, *names: str) -> dict[str, Any]:
 
 
 def write_json(document: Any, path: Path) -> None:
-    """Writes a document as indented JSON.
-
-    Args:
-        document: Plain values.
-        path: File to write.
-
-    Raises:
-        ValueError: A number is infinite or NaN.
-    """
+    """Writes plain values as indented JSON; raises ValueError for infinity and NaN."""
     text = json.dumps(document, indent=2, allow_nan=False)
     path.write_text(f"{text}\n", "utf-8")

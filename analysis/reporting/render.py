@@ -8,6 +8,7 @@ keyboard through wide tables and figures.
 from __future__ import annotations
 
 import html as escaping
+import io
 import re
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -15,8 +16,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
+from matplotlib.figure import Figure as Drawing
+from matplotlib.font_manager import FontProperties
+from matplotlib.mathtext import math_to_image
 
 from analysis.reporting.section import (
     ZERO,
@@ -36,7 +41,6 @@ from analysis.reporting.section import (
     Table,
     number,
 )
-from analysis.reporting.svg import figure_svg, formula_svg
 
 _HERE = Path(__file__).parent
 #: CSS variables with the colors of pages, in light mode and in dark mode.
@@ -63,17 +67,16 @@ def html(content: Content, name: str = "", level: int = 2) -> Markup:
     return Markup(_template().show(content, name, level))
 
 
+def heading(text: str) -> Markup:
+    """Returns a heading inside a section of a page as HTML."""
+    return Markup("<h3>{}</h3>").format(text)
+
+
 def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) -> str:
-    """Returns a whole HTML document.
+    """Returns a whole HTML document with an embedded style sheet.
 
-    Args:
-        title: Title of the browser window, and heading of the page.
-        contents: Pairs of anchor and title, one pair for each section.
-        parts: Sections of the page in HTML.
-
-    Returns:
-        HTML with an embedded style sheet. The page loads no other files, apart from its
-        pictures.
+    The contents are pairs of anchor and title, one pair for each of the sections, which
+    ``parts`` contains as HTML. The page loads no other files, apart from its pictures.
     """
     return f"{_template().page(title, list(contents), list(map(Markup, parts)))}\n"
 
@@ -170,3 +173,55 @@ def _inline(line: str) -> Markup:
     """Escapes a text; text between backquotes becomes code."""
     plain = escaping.escape(line, quote=False)
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", plain))
+
+
+def figure_svg(figure: Drawing, name: str, label: str) -> Markup:
+    """Returns a figure as an SVG element; the same figure always gives the same HTML.
+
+    All identifiers in the SVG begin with the name, so each drawing of a page needs a
+    different one: letters, digits, hyphens and underscores. The label is for screen
+    readers.
+    """
+    stream = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
+        figure.savefig(
+            stream,
+            format="svg",
+            metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
+        )
+    return _embed(stream.getvalue(), name, label)
+
+
+def formula_svg(tex: str, name: str, label: str) -> Markup:
+    """Returns a formula as an SVG element; see ``figure_svg`` for name and label.
+
+    The formula is in matplotlib's subset of TeX, without dollar signs.
+    """
+    stream = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": name, "mathtext.fontset": "cm"}):
+        math_to_image(
+            f"${tex}$", stream, prop=FontProperties(size=13), dpi=72, format="svg"
+        )
+    return _embed(stream.getvalue().decode(), name, label)
+
+
+def _embed(svg: str, name: str, label: str) -> Markup:
+    """Turns the text of an SVG file into an element of an HTML page.
+
+    Identifiers must be unique on the page. If another part of the SVG refers to an
+    identifier, the function puts the drawing's name in front of the identifier. The
+    function removes all other identifiers.
+    """
+    svg = svg[svg.index("<svg") :].strip()
+    svg = re.sub(r"(?s)<metadata>.*?</metadata>", "", svg)
+    svg = re.sub(r"<!--.*?-->", "", svg)
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', svg))
+
+    def kept(match: re.Match[str]) -> str:
+        return f' id="{name}-{match[1]}"' if match[1] in used else ""
+
+    svg = re.sub(r' id="([^"]+)"', kept, svg)
+    svg = re.sub(r'(href=")#', rf"\1#{name}-", svg)
+    svg = svg.replace("url(#", f"url(#{name}-")
+    label = escaping.escape(label.replace("`", ""))
+    return Markup(svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1))

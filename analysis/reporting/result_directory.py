@@ -22,14 +22,9 @@ class ResultDirectory:
     def __init__(self, path: Path, made: list[Path]) -> None:
         """Locks an existing directory.
 
-        Args:
-            path: The directory.
-            made: New directories among ``path`` and its parents, innermost first.
-                ``undo`` removes them.
-
-        Raises:
-            InputError: Another process has locked the directory, or the directory is no
-                longer empty.
+        The list ``made`` contains the new directories among the path and its parents,
+        innermost first; ``undo`` removes them. Raises InputError if another process has
+        locked the directory, or if the directory is no longer empty.
         """
         self.path = path
         self._made = made
@@ -57,11 +52,8 @@ class ResultDirectory:
         """Unlocks the directory, and removes it if this process created it.
 
         Parent directories that this process created are removed, too. Directories that
-        are not empty are kept, unless ``contents`` is true.
-
-        Args:
-            contents: Whether to remove the result directory together with its contents,
-                if this process created the directory.
+        are not empty are kept. With ``contents``, the result directory is removed
+        together with its contents.
         """
         if contents and self.path in self._made:
             shutil.rmtree(self.path, ignore_errors=True)
@@ -74,14 +66,8 @@ class ResultDirectory:
 def take_directory(out: str | Path | None) -> ResultDirectory:
     """Creates and locks the result directory before any computation starts.
 
-    Args:
-        out: New or empty directory. None means the next number under ``results``.
-
-    Returns:
-        The directory. It exists, is empty, and belongs to this process.
-
-    Raises:
-        InputError: The directory is in use, or cannot be created or written.
+    None means the next number under ``results``. The directory exists then, is empty,
+    and belongs to this process. For errors, see ``check_directory``.
     """
     if out is not None:
         path = check_directory(out)
@@ -91,22 +77,12 @@ def take_directory(out: str | Path | None) -> ResultDirectory:
 
 @contextmanager
 def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
-    """Gives a hidden directory to write to, and renames this directory at the end.
+    """Yields the result directory as the user knows it, and a hidden one to write to.
 
     At the end of the ``with`` block, the hidden directory replaces the result
     directory. If the block raises an exception, including KeyboardInterrupt, all new
     directories are removed. This also applies to parent directories that were created.
-
-    Args:
-        out: New or empty result directory. None means the next number under
-            ``results``.
-
-    Yields:
-        A pair of paths. The first is the result directory as the user knows it. The
-        second is the hidden directory.
-
-    Raises:
-        InputError: The directory is in use, or cannot be created or written.
+    For ``out``, see ``take_directory``.
     """
     taken = take_directory(out)
     path, partial = taken.path, None
@@ -128,18 +104,10 @@ def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
 
 
 def check_directory(out: str | Path, *, parent: bool = False) -> Path:
-    """Checks whether a new directory can be created, and resolves its path.
+    """Checks that a new directory can be created, and resolves its path.
 
-    Args:
-        out: Directory that the user named.
-        parent: Whether ``out`` is only the parent of the new directory. If true,
-            ``out`` may contain files.
-
-    Returns:
-        Absolute path without symbolic links.
-
-    Raises:
-        InputError: The directory is in use, or cannot be created or written.
+    If ``out`` is only the parent of the new directory, it may contain files. Raises
+    InputError if the directory is in use, or cannot be created or written.
     """
     shown = shortened(str(out), 80)
     try:

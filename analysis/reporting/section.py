@@ -36,15 +36,8 @@ ZERO = "\u00b7"
 def number(value: complex | None, digits: int = 4) -> str:
     """Writes a number with a fixed number of significant digits and a true minus sign.
 
-    A complex number is written as a sum with j. A missing number is written as a dash.
-
-    Args:
-        value: The number; None and NaN mean that it is missing.
-        digits: Number of significant digits of a float. Whole numbers keep all their
-            digits.
-
-    Returns:
-        Plain text.
+    A complex number is written as a sum with j. None and NaN are written as a dash.
+    Whole numbers keep all their digits.
     """
     if value is None or cmath.isnan(value):
         return "\u2013"

@@ -111,8 +111,7 @@ _OBSTACLES = [
         collision_K_B_y="leftward part of collision vector k",
     ),
     *_of(
-        "number",
-        feature_K="code of the sensors that vector k comes from; 0: no vector",
+        "number", feature_K="code of the sensors that vector k comes from; 0: no vector"
     ),
     *_of(
         "m/s",
@@ -238,15 +237,10 @@ _BY_NAME = {column.name: column for column in COLUMNS}
 
 
 def column_of(name: str) -> Column | None:
-    """Returns the unit and the meaning of one column.
+    """Returns the unit and the meaning of a column, or None for a user's own block.
 
-    Args:
-        name: Name of the column in the table. With several robots, the name begins with
-            the name of the robot and a dot.
-
-    Returns:
-        Column with this name. If the name contains a number, the meaning contains this
-        number, too. The value is None for a column of a user's own block.
+    The name may begin with the name of a robot and a dot. If it contains a number, the
+    meaning contains this number, too.
     """
     own = name.rpartition(".")[2]
     number = re.search(r"(?<=_)\d+", own)

@@ -14,16 +14,9 @@ from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners
 
 
 def contact_point(result: RunResult) -> NDArray[np.float64]:
-    """Returns the point at which the robot touched the other body.
+    """Returns the (2,) point in W at which the robot touched the other body, m.
 
-    Args:
-        result: Result of a run, for one robot, that ended in a collision.
-
-    Returns:
-        (2,) position in the world frame W, m.
-
-    Raises:
-        InputError: The run had no collision.
+    Raises InputError if the run had no collision.
     """
     hit, scenario = result.collision, result.scenario
     if hit is None:
@@ -37,18 +30,12 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
 def touching_point(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Returns the point at which two rectangles touch.
+    """Returns the (2,) point at which two rectangles touch, m.
 
-    The point is the mean of all corners of either rectangle that lie inside the other
-    rectangle. If there is no such corner, the point is the mean of the corners that are
-    nearest to the other rectangle.
-
-    Args:
-        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
-        b: (5,) second rectangle in the same frame, m and rad.
-
-    Returns:
-        (2,) position in the same frame, m.
+    Both rectangles are (x, y, theta, length, width), m and rad, in the frame of the
+    result. The point is the mean of all corners of either rectangle that lie inside the
+    other rectangle. If there is no such corner, the point is the mean of the corners
+    that are nearest to the other rectangle.
     """
     corners = np.concatenate([rectangle_corners(a), rectangle_corners(b)])
     others = [b] * 4 + [a] * 4

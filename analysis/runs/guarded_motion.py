@@ -38,16 +38,9 @@ class GuardedMotion:
 
 
 def guarded_motion(result: RunResult) -> GuardedMotion | None:
-    """Finds what the safety guard did at each tick (control period) of a run.
+    """Finds what the safety guard did at each tick; None if the robot has no guard.
 
-    The guard limits the commands of the control law.
-
-    Args:
-        result: Result of a run, for one robot.
-
-    Returns:
-        Actions of the guard, and resting poses of the robot. The value is None if the
-        robot has no guard.
+    The guard limits the commands of the control law at each tick (control period).
     """
     columns, scenario = result.columns, result.scenario
     if scenario.only.own_guard is None or "guard_action" not in columns:
@@ -91,14 +84,9 @@ class Halt:
 
 
 def halts_of(result: RunResult) -> list[Halt]:
-    """Lists the sensing faults for which the safety guard halted a robot.
+    """Lists the sensing faults for which the safety guard halted the robot of a run.
 
-    Args:
-        result: Result of a run, for one robot.
-
-    Returns:
-        One halt per fault of each sensor, sorted by start time. The list is empty if
-        there was no fault.
+    Each fault of each sensor is one halt. The halts are sorted by start time.
     """
     columns, found = result.columns, []
     if "sensing_fault" not in columns:
@@ -120,18 +108,10 @@ def _resting_poses(
     commands: NDArray[np.float64],
     numbers: BrakingNumbers,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes where the robot would come to rest if it braked at each tick.
+    """Computes the (n, 3) poses at which the robot would rest if it braked at a tick.
 
-    A tick is a control period. The braking model is that of the safety guard.
-
-    Args:
-        poses: (n, 3) poses (x, y, theta) of the robot at the ticks, m and rad.
-        commands: (n, 2) commands of the previous tick, for each tick: speeds of the
-            left and right wheel, rad/s.
-        numbers: Braking model of the robot.
-
-    Returns:
-        (n, 3) resting poses (x, y, theta) in the frame of ``poses``, m and rad.
+    Poses are (x, y, theta), m and rad. The (n, 2) commands are the speeds of the left
+    and right wheel that the previous tick commanded, rad/s.
     """
     rests = np.empty(poses.shape)
     speeds, kept = (0.0, 0.0), numbers.part.kept**numbers.parts

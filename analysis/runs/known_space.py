@@ -57,14 +57,7 @@ class KnownSpace:
         return x, x + wide * self.cell_m, y, y + deep * self.cell_m
 
     def middles(self, cells: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Returns the center of each selected cell.
-
-        Args:
-            cells: (i, j) whether each cell is selected.
-
-        Returns:
-            (m, 2) positions of the centers of the selected cells, m.
-        """
+        """Returns the (m, 2) centers of the m cells that a mask (i, j) selects, m."""
         counted = np.argwhere(cells).astype(np.float64)
         return np.array(self.corner_m) + (counted + 0.5) * np.float64(self.cell_m)
 
@@ -72,18 +65,11 @@ class KnownSpace:
 def has_known_space(result: RunResult) -> bool:
     """Returns whether the log of a run is sufficient to reconstruct the robot's map.
 
-    Three conditions must hold:
+    Three conditions must hold. The joint result of several robots never fulfills them.
 
     - The robot has a safety guard, which uses a map of free floor.
     - The blocks of the range sensors and of the map are not a user's own blocks.
     - The log contains the poses, the wheel speeds and the sensor readings.
-
-    Args:
-        result: Result of a run.
-
-    Returns:
-        Whether all conditions hold. The value is False for the joint result of several
-        robots.
     """
     scenario = result.scenario
     if result.several or scenario.only.own_guard is None:
@@ -101,14 +87,9 @@ def has_known_space(result: RunResult) -> bool:
 def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
     """Reconstructs the map of free floor at each tick (control period) of a run.
 
-    The function feeds the log to the step of the block ``FreeSpaceMap``.
-
-    Args:
-        result: Result of a run, for one robot with a safety guard.
-
-    Yields:
-        The map at each tick of the log. Every tick yields the same object, which
-        changes at the next tick. Copy all values that you need later.
+    The function feeds the log to the step of the block ``FreeSpaceMap``. Every tick
+    yields the same object, which changes at the next tick. Copy all values that you
+    need later.
     """
     scenario, tick_s = result.scenario, result.scenario.tick_s
     sensors = scenario.sensing.ultrasonic
@@ -144,12 +125,6 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
     - (sensors,) ages of the readings, s
     - (3,) pose (x, y, theta) by odometry, m and rad
     - (2,) speeds of the left and right wheel, as commanded at the previous tick, rad/s
-
-    Args:
-        result: Result of a run, for one robot with a safety guard.
-
-    Yields:
-        The five arrays of each tick.
     """
     scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
     sensors = scenario.sensing.ultrasonic
@@ -175,18 +150,11 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
 
 
 def known_space(result: RunResult, times: ArrayLike) -> KnownSpace | None:
-    """Reconstructs what a robot with a safety guard knew of the floor at given times.
+    """Reconstructs what a robot with a safety guard knew of the floor at times in s.
 
     For each time, the function uses the nearest tick (control period). It uses no tick
-    twice.
-
-    Args:
-        result: Result of a run, for one robot.
-        times: (n,) times, s.
-
-    Returns:
-        Map at these ticks. The grid contains all cells that were known at any of these
-        ticks. The value is None if ``has_known_space`` is False.
+    twice. The grid contains all cells that were known at any of these ticks. The value
+    is None if ``has_known_space`` is False.
     """
     if not has_known_space(result):
         return None

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.spatial import KDTree
 
-from analysis.runs.collision_warning import echo_times
 from analysis.runs.proximity import Proximity
 from analysis.runs.shortest_path import shortest_path_length
 from analysis.runs.smoothness import jerk, windows
 from diagrams.running.stop_rules import REST_SPEED_M_S, ROUNDING_S
-from systems.world.geometry import control_point_velocity
+from systems.framework.compiling import njit
+from systems.world.geometry import control_point_velocity, fan_ranges
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -32,6 +32,9 @@ MET_M, AFTER_S = 1.0, 5.0
 #: Length of the moving mean of the yaw rate, s. Slower changes count as turns, not as
 #: ripple.
 MEAN_S = 1.0
+#: An echo belongs to a body if the range reading differs from the true range of this
+#: body by at most this distance, m.
+SAME_M = 0.03
 
 
 class MeasuredRun(Proximity):
@@ -221,8 +224,31 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def echo_times(self) -> tuple[float | None, float | None]:
-        """Times from first and last echo of a touched body to the contact, s."""
-        return echo_times(self.result)
+        """Times from the first and from the last echo of the touched body to contact.
+
+        The times are in s. Both are None if the run had no collision, or if the body
+        never caused an echo. The robot must have range sensors.
+        """
+        hit = self.result.collision
+        if hit is None:
+            return None, None
+        known = self.time[self._echoes(hit.object)]
+        if not len(known):
+            return None, None
+        first, last = np.maximum(hit.time - known[[0, -1]], 0.0).tolist()
+        return first, last
+
+    def _echoes(self, name: str) -> Flags:
+        """(n,) whether any sensor had an echo of the named body, at each tick."""
+        scenario = self.result.scenario
+        sensors = scenario.sensing.ultrasonic
+        bodies = self.result.surroundings.bodies[name].rectangles(self.time)
+        offset = scenario.only.robot.control_point_m
+        ranges = _cone_ranges(self.result.poses("WB"), bodies, *sensors.beams, offset)
+        numbers = range(1, sensors.count + 1)
+        read = np.stack([self.columns[f"range_{k}"] for k in numbers], axis=1)
+        echo = np.stack([self.columns[f"echo_{k}"] for k in numbers], axis=1) > 0.5
+        return np.any(echo & (np.abs(read - ranges) <= SAME_M), axis=1)
 
     @cached_property
     def odometry_error(self) -> Floats:
@@ -282,15 +308,28 @@ class MeasuredRun(Proximity):
         return new
 
 
+@njit(cache=True)
+def _cone_ranges(
+    poses: Floats,
+    bodies: Floats,
+    axes: Floats,
+    places: Floats,
+    half_angles: Floats,
+    control_point_m: float,
+) -> Floats:  # pragma: no cover  (compiled)
+    """(n, sensors) true ranges of one moving rectangle, m; see ``fan_ranges``."""
+    ranges = np.empty((len(poses), axes.size))
+    for i in range(len(poses)):
+        ranges[i] = fan_ranges(
+            poses[i], bodies[i : i + 1], axes, places, half_angles, control_point_m
+        )
+    return ranges
+
+
 def near_and_after(clearance: ArrayLike, period_s: float) -> Flags:
-    """Returns when an obstacle is nearer than 1 m, or was nearer within the last 5 s.
+    """(n,) whether an obstacle is nearer than 1 m, or was nearer within the last 5 s.
 
-    Args:
-        clearance: (n,) clearance from the nearest obstacle at constant intervals, m.
-        period_s: Interval, s.
-
-    Returns:
-        (n,) whether one of these conditions holds, for each sample.
+    The (n,) clearances from the nearest obstacle are in m.
     """
     near = np.asarray(clearance, dtype=float) < MET_M
     ticks = np.arange(len(near))
@@ -299,15 +338,10 @@ def near_and_after(clearance: ArrayLike, period_s: float) -> Flags:
 
 
 def yaw_ripple(rate: ArrayLike, where: Flags, period_s: float) -> float | None:
-    """Computes the RMS value of a yaw rate minus its moving mean over 1 s.
+    """Computes the RMS value of a yaw rate (n,) minus its moving mean over 1 s.
 
-    Args:
-        rate: (n,) yaw rates at constant intervals, rad/s.
-        where: (n,) whether each sample counts.
-        period_s: Interval, s.
-
-    Returns:
-        RMS value, rad/s. The value is None if no sample counts.
+    The flags ``where`` (n,) select the samples that count. The value has the unit of
+    the rate. It is None if no sample counts.
     """
     if not np.any(where):
         return None

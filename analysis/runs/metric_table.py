@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.runs.measured_run import (
     MOVING_M_S,
+    Flags,
+    Floats,
     MeasuredRun,
     lengths,
     quantile,
@@ -104,16 +105,10 @@ class Group(NamedTuple):
 
 
 def run_metrics(result: RunResult) -> dict[str, float | None]:
-    """Computes all metrics of a run, in the units of ``METRICS``.
+    """Computes all metrics of a run by name, in the units of ``METRICS``.
 
     If a metric does not apply to the run, its value is None. If the run has several
     robots, each name begins with the name of the robot and a dot.
-
-    Args:
-        result: Result of a run, for one robot or several robots.
-
-    Returns:
-        Value of each metric, by name.
     """
     if result.several:
         return {
@@ -149,7 +144,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _first_time(run: MeasuredRun, flags: NDArray[np.bool_]) -> float | None:
+def _first_time(run: MeasuredRun, flags: Flags) -> float | None:
     found = np.flatnonzero(flags)
     return float(run.time[found[0]]) if len(found) else None
 
@@ -257,42 +252,28 @@ def _reaction_distance(run: MeasuredRun) -> float | None:
         [columns[f"feature_{k}"], *result.vector(f"collision_{k}_B")] for k in (1, 2, 3)
     ]
     distance = _first_reaction(
-        run.bodies,
-        result.vector("p_WP"),
-        result.vector("repulsion"),
-        np.array(echoes),
+        run.bodies, result.vector("p_WP"), result.vector("repulsion"), np.array(echoes)
     )
     return distance if math.isfinite(distance) else None
 
 
 @njit(cache=True)
 def _first_reaction(
-    bodies: NDArray[np.float64],
-    p_WP: NDArray[np.float64],
-    push: NDArray[np.float64],
-    echoes: NDArray[np.float64],
+    bodies: Floats, p_WP: Floats, push: Floats, echoes: Floats
 ) -> float:  # pragma: no cover  (compiled)
-    """Returns how near an obstacle is when the control law first reacts to it.
+    """Returns how near an obstacle is when the control law first reacts to it, m.
 
-    The law reacts at a tick (control period) if three conditions hold:
+    The law reacts at a tick (control period) if three conditions hold. If it never
+    reacts, the distance is infinite.
 
-    - The repulsive force is at least ``REACTION_N``.
-    - The nearest obstacle is nearer to the control point P than the target is.
+    - The repulsive force ``push`` (2, n) is at least ``REACTION_N``.
+    - The nearest obstacle is nearer to the control point P than the target is. The
+      target is the last of the m ``bodies`` (m, n, 5).
     - A collision vector agrees with this obstacle: its length differs from the distance
-      of the obstacle by at most ``ECHO_M``. A collision vector points from P to an
-      echo.
+      of the obstacle by at most ``ECHO_M``.
 
-    Args:
-        bodies: (m, n, 5) rectangles of the m bodies at n ticks. The last body is the
-            target of the robot.
-        p_WP: (2, n) positions of P in the world frame W, m.
-        push: (2, n) repulsive force of the law in W, N.
-        echoes: (k, 3, n) k collision vectors. Each has three entries: a number above 0
-            if there is a vector, and its x and y in the robot frame B, m.
-
-    Returns:
-        Distance from P to the nearest obstacle, m. It is infinite if the law never
-        reacted.
+    The ``echoes`` (k, 3, n) hold k collision vectors, which point from P to an echo: a
+    number above 0 if there is a vector, and its x and y in the robot frame B, m.
     """
     for i in range(push.shape[1]):
         if math.hypot(push[0, i], push[1, i]) < REACTION_N:
@@ -554,29 +535,28 @@ _ROUTE = (
 def _gains(name: str, unit: str, ending: str, symbol: str) -> tuple[Metric, ...]:
     """Metrics of a gain that the law may adapt: its extremes and its last value."""
 
-    def of(which: str, read: Callable[[NDArray[np.float64]], float]) -> Metric:
+    def of(
+        which: str,
+        robots: Literal["mean", "least", "greatest"],
+        read: Callable[[Floats], float],
+    ) -> Metric:
         return Metric(
             f"{which}_{name}_{ending}",
             unit,
             f"{which} {name} {symbol}",
             f"{which} value of the {name} {symbol}, if the law adapts {symbol}",
             lambda run: float(read(run.columns[name])),
-            robots=_OF_ROBOTS[which],
+            robots=robots,
             paired=True,
         )
 
     return (
-        of("least", np.min),
-        of("greatest", np.max),
-        of("last", lambda values: values[-1]),
+        of("least", "least", np.min),
+        of("greatest", "greatest", np.max),
+        of("last", "mean", lambda values: values[-1]),
     )
 
 
-_OF_ROBOTS: dict[str, Literal["mean", "least", "greatest"]] = {
-    "least": "least",
-    "greatest": "greatest",
-    "last": "mean",
-}
 _STIFFNESS = _gains("stiffness", "N/m", "n_m", "K")
 _DAMPING = _gains("damping", "N s/m", "n_s_m", "D")
 _SEARCH = (

@@ -14,6 +14,8 @@ from diagrams.scenario.bodies import rectangles_at
 from systems.framework.compiling import njit
 from systems.world.geometry import contact_time, rectangle_clearance
 
+Floats = NDArray[np.float64]
+
 #: Clearance below which the clearances between two ticks are computed, too, m.
 NEAR_M = 0.1
 #: Number of parts into which the time between two ticks is then divided.
@@ -31,12 +33,12 @@ class Proximity:
     result: RunResult
 
     @cached_property
-    def robot(self) -> NDArray[np.float64]:
+    def robot(self) -> Floats:
         """(n, 5) rectangles (x, y, theta, length, width) of the robot at the ticks."""
         return rectangles_at(self.result.poses("WB"), self.result.scenario.only.size)
 
     @cached_property
-    def bodies(self) -> NDArray[np.float64]:
+    def bodies(self) -> Floats:
         """(m, n, 5) rectangles of m bodies at n ticks (control periods).
 
         If the target of the robot is a body, it is the last body.
@@ -49,12 +51,12 @@ class Proximity:
         return np.reshape(bodies, (-1, len(time), 5))
 
     @property
-    def clearance(self) -> NDArray[np.float64]:
+    def clearance(self) -> Floats:
         """(n,) distance to the nearest body at the ticks, m; negative inside a body."""
         return self._clearances[0]
 
     @cached_property
-    def least(self) -> NDArray[np.float64]:
+    def least(self) -> Floats:
         """(m,) least clearance from each body, including the time between ticks, m.
 
         A tick is a control period of 25 ms by default. A body can pass the robot
@@ -103,27 +105,23 @@ class Proximity:
         return _least_contact_time(self.result.time, self.robot, velocity, self.bodies)
 
     @cached_property
-    def _clearances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _clearances(self) -> tuple[Floats, Floats]:
         return least_clearances(self.robot, self.bodies)
 
 
 @njit(cache=True)
 def least_clearances(
-    robot: NDArray[np.float64], bodies: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
+    robot: Floats, bodies: Floats
+) -> tuple[Floats, Floats]:  # pragma: no cover  (compiled)
     """Computes the least clearances between a moving rectangle and other rectangles.
+
+    The robot (n, 5) and the m bodies (m, n, 5) are rectangles (x, y, theta, length,
+    width) at n times, m and rad. The function returns the (n,) clearance from the
+    nearest body at each time and the (m,) least clearance from each body over all
+    times, m. If rectangles overlap, the clearance is negative.
 
     To save time, the function skips a body at times at which the enclosing circles of
     both rectangles are far apart.
-
-    Args:
-        robot: (n, 5) rectangle (x, y, theta, length, width) at n times, m and rad.
-        bodies: (m, n, 5) rectangles of the m other bodies at these times, m and rad.
-
-    Returns:
-        Two arrays. The first array has the (n,) clearance from the nearest body at each
-        time, m. The second array has the (m,) least clearance from each body over all
-        times, m. If rectangles overlap, the clearance is negative.
     """
     count, ticks = bodies.shape[:2]
     nearest, least = np.full(ticks, np.inf), np.full(count, np.inf)
@@ -147,23 +145,12 @@ def least_clearances(
 
 @njit(cache=True)
 def _least_contact_time(
-    time: NDArray[np.float64],
-    robot: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    bodies: NDArray[np.float64],
+    time: Floats, robot: Floats, velocity: Floats, bodies: Floats
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the least predicted time to a contact, over all ticks and bodies.
+    """Computes the least predicted time to a contact, over all ticks and bodies, s.
 
-    A tick is a control period.
-
-    Args:
-        time: (n,) times of the ticks, s.
-        robot: (n, 5) rectangles (x, y, theta, length, width) of the robot, m and rad.
-        velocity: (2, n) velocity of the robot, m/s.
-        bodies: (m, n, 5) rectangles of the bodies, m and rad.
-
-    Returns:
-        Least time to a contact, s. It is infinite if no contact is predicted.
+    The time is infinite if no contact is predicted. The velocity (2, n) is in m/s; for
+    the rectangles, see ``least_clearances``.
     """
     least, reaches = np.inf, _reaches(robot, bodies)
     for k in range(len(bodies)):
@@ -184,9 +171,7 @@ def _least_contact_time(
 
 
 @njit(cache=True)
-def _reaches(
-    robot: NDArray[np.float64], bodies: NDArray[np.float64]
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+def _reaches(robot: Floats, bodies: Floats) -> Floats:  # pragma: no cover  (compiled)
     """(m,) radius of the circle around the robot plus that around each body, m."""
     reaches = np.empty(len(bodies))
     for k in range(len(bodies)):
@@ -196,9 +181,7 @@ def _reaches(
 
 
 @njit(cache=True)
-def _gap(
-    a: NDArray[np.float64], b: NDArray[np.float64], reach: float
-) -> float:  # pragma: no cover  (compiled)
+def _gap(a: Floats, b: Floats, reach: float) -> float:  # pragma: no cover  (compiled)
     """Gap between the circles around two rectangles, m; negative if they overlap."""
     dx, dy = a[0] - b[0], a[1] - b[1]
     return math.sqrt(dx * dx + dy * dy) - reach
@@ -206,7 +189,7 @@ def _gap(
 
 @njit(cache=True)
 def _rate(
-    time: NDArray[np.float64], values: NDArray[np.float64], i: int
+    time: Floats, values: Floats, i: int
 ) -> float:  # pragma: no cover  (compiled)
     """Derivative of the values at a tick, from a parabola through the neighbors."""
     if i == 0:

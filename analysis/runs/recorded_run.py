@@ -47,15 +47,7 @@ class RecordedRun:
     def load(cls, directory: str | Path) -> RecordedRun:
         """Loads a recorded run from the result directory of ``phonotaxis simulate``.
 
-        Args:
-            directory: Result directory.
-
-        Returns:
-            The recorded run.
-
-        Raises:
-            InputError: The directory is not a result directory, or its files do not
-                belong together.
+        Raises InputError if the files are missing or do not belong together.
         """
         folder = Path(directory)
         for name in (SCENARIO_FILE, TABLE_FILE):

@@ -61,15 +61,7 @@ def _outcome(result: RunResult) -> dict[str, Any]:
 
 
 def run_text(result: RunResult, summary: dict[str, Any]) -> str:
-    """Returns the summary of a run as text that fits on one screen.
-
-    Args:
-        result: Result of the run.
-        summary: Summary of the run, from ``run_document``.
-
-    Returns:
-        Lines of text. The last line has no line end.
-    """
+    """Returns the summary of a run as text that fits on one screen."""
     return "\n".join(
         f"{name.split('.')[-1]:<21} {value}"
         for name, value in summary_rows(result, summary).items()
@@ -77,15 +69,9 @@ def run_text(result: RunResult, summary: dict[str, Any]) -> str:
 
 
 def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
-    """Returns the rows of a run's summary for the terminal.
+    """Returns the rows of a run's summary for the terminal, by name of the row.
 
-    Args:
-        result: Result of the run.
-        summary: Summary of the run, from ``run_document``.
-
-    Returns:
-        Text of each row, by name of the row. With several robots, the names of a
-        robot's rows begin with the name of the robot and a dot.
+    With several robots, the names of a robot's rows begin with its name and a dot.
     """
     timing = summary["timing"]
     scenario = result.full_scenario

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from systems.framework.compiling import njit
 from systems.world.geometry import beyond_rectangle, segment_clearance
 
+Floats = NDArray[np.float64]
+
 #: Number of tangents that replace a quarter circle around a corner. Their total length
 #: is 0.6 % longer than the arc.
 TANGENTS = 6
@@ -27,25 +29,15 @@ def shortest_path_length(
 ) -> float:
     """Computes the length of the shortest path of a disc to a circle around the goal.
 
-    The function grows the boxes by the radius of the disc. Then it runs A* on their
-    visibility graph, whose edges connect points on the outlines of the grown boxes. The
-    last leg of a path runs straight toward the goal. Polygons just outside the arcs
-    replace the rounded corners.
+    Lengths are in m. The boxes (n, 5) are rectangles (x, y, theta, length, width) at
+    rest, m and rad. The function grows them by the radius of the disc. Then it runs A*
+    on their visibility graph, whose edges connect points on the outlines of the grown
+    boxes. The last leg of a path runs straight toward the goal. Polygons just outside
+    the arcs replace the rounded corners.
 
     If the disc overlaps a box at the start, this box grows only up to the center of the
-    disc.
-
-    Args:
-        start: (2,) initial position of the disc's center, m.
-        goal: (2,) position of the goal, m.
-        goal_radius: Radius of the circle around the goal, m. The path ends at this
-            circle.
-        boxes: (n, 5) rectangles (x, y, theta, length, width) at rest, m and rad.
-        radius: Radius of the disc, m.
-
-    Returns:
-        Length of the path, m. It is 0 if the start is inside the circle, and infinite
-        if there is no path.
+    disc. The length is 0 if the start is inside the circle, and infinite if there is no
+    path.
     """
     ends = np.asarray([start, goal], dtype=float)
     rectangles = np.asarray(boxes, dtype=float).reshape(-1, 5)
@@ -54,11 +46,7 @@ def shortest_path_length(
 
 @njit(cache=True)
 def _search(
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
-    goal_radius: float,
-    boxes: NDArray[np.float64],
-    radius: float,
+    start: Floats, goal: Floats, goal_radius: float, boxes: Floats, radius: float
 ) -> float:  # pragma: no cover  (compiled)
     """Runs A* from the start, with the straight distance to the circle as heuristic."""
     radii = np.array([min(radius, _beyond(start, box)) for box in boxes])
@@ -96,16 +84,12 @@ def _search(
 
 
 @njit(cache=True)
-def _distance(
-    a: NDArray[np.float64], b: NDArray[np.float64]
-) -> float:  # pragma: no cover  (compiled)
+def _distance(a: Floats, b: Floats) -> float:  # pragma: no cover  (compiled)
     return math.hypot(b[0] - a[0], b[1] - a[1])
 
 
 @njit(cache=True)
-def _beyond(
-    point: NDArray[np.float64], box: NDArray[np.float64]
-) -> float:  # pragma: no cover  (compiled)
+def _beyond(point: Floats, box: Floats) -> float:  # pragma: no cover  (compiled)
     """Returns the distance of a point from a box, m."""
     du, dv = beyond_rectangle(point, box)
     return math.hypot(du, dv)
@@ -113,7 +97,7 @@ def _beyond(
 
 @njit(cache=True)
 def _outline(
-    box: NDArray[np.float64], radius: float, corners: NDArray[np.float64]
+    box: Floats, radius: float, corners: Floats
 ) -> None:  # pragma: no cover  (compiled)
     """Computes the corners of a polygon just outside a box grown by a radius."""
     step = 0.5 * math.pi / TANGENTS
@@ -129,10 +113,7 @@ def _outline(
 
 @njit(cache=True)
 def _free(
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
-    boxes: NDArray[np.float64],
-    radii: NDArray[np.float64],
+    start: Floats, end: Floats, boxes: Floats, radii: Floats
 ) -> bool:  # pragma: no cover  (compiled)
     """Whether a straight leg keeps the required distance from each box."""
     for k in range(len(boxes)):

@@ -11,6 +11,8 @@ from scipy.fft import rfft
 
 from systems.framework.compiling import njit
 
+Floats = NDArray[np.float64]
+
 #: Half of the time over which ``jerk`` fits a cubic, s. At 25 ms, this is 5 samples.
 JERK_HALF_WINDOW_S = 0.125
 #: Highest frequency of ``spectral_arc_length``, Hz.
@@ -22,22 +24,16 @@ THRESHOLD = 0.05
 PADDING = 4
 
 
-def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
-    """Computes the jerk as the second derivative of a velocity.
+def jerk(velocity: ArrayLike, period: float) -> Floats:
+    """Computes the jerk of a velocity (n,) or (n, k) as its second derivative.
 
     The function fits a cubic polynomial to the velocity over 0.25 s by least squares (a
     Savitzky-Golay filter). It does not resample the velocity. Slow motion remains
     nearly unchanged. The jerk of a sine is too low: by 5 % at 1 Hz, by 19 % at 2 Hz,
     and by 79 % at 5 Hz.
 
-    Args:
-        velocity: (n,) or (n, k) velocities at constant intervals, m/s or rad/s.
-        period: Interval, s.
-
-    Returns:
-        (m,) or (m, k) jerk, m/s^3 or rad/s^3. The result contains only samples with a
-        complete fitting window. At an interval of 25 ms, m is n - 10. If no window is
-        complete, the result is empty.
+    The result (m,) or (m, k) contains only samples with a complete fitting window. At a
+    period of 25 ms, m is n - 10. If no window is complete, the result is empty.
     """
     velocity = np.asarray(velocity, dtype=float)
     half = max(2, round(JERK_HALF_WINDOW_S / period))
@@ -50,7 +46,7 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
 
 
 @cache
-def _second_derivative(half: int) -> NDArray[np.float64]:
+def _second_derivative(half: int) -> Floats:
     """Returns the weights of samples for the second derivative of a fitted cubic.
 
     The weights apply to 2 half + 1 samples at an interval of 1.
@@ -58,26 +54,19 @@ def _second_derivative(half: int) -> NDArray[np.float64]:
     square = np.arange(-half, half + 1.0) ** 2
     # The cubic's odd terms are orthogonal to the square less its mean.
     square -= np.mean(square)
-    weights: NDArray[np.float64] = 2.0 * square / np.sum(square**2)
+    weights: Floats = 2.0 * square / np.sum(square**2)
     return weights
 
 
-def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
-    """Computes the spectral arc length (SPARC), a measure of smoothness.
+def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> Floats:
+    """Computes the spectral arc lengths (SPARC) of speeds (..., n), dimensionless.
 
     The function computes the magnitude spectrum of the speed, and normalizes frequency
     and magnitude to 1. The result is minus the length of this curve (Balasubramanian et
     al. 2012, 2015). A less smooth motion has a more negative value.
 
-    The measure applies to motions of a few seconds. Longer motions have to be divided
-    with ``windows``.
-
-    Args:
-        speed: (..., n) speeds, m/s. No window may be at rest throughout.
-        rate_hz: Sample rate, Hz.
-
-    Returns:
-        (...) spectral arc lengths, dimensionless.
+    The measure applies to motions of a few seconds that are not at rest throughout.
+    Longer motions have to be divided with ``windows``.
     """
     speed = np.asarray(speed, dtype=float)
     count = 2 ** (math.ceil(math.log2(speed.shape[-1])) + PADDING)
@@ -89,7 +78,7 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
 @njit(cache=True)
 def _arc_lengths(
     spectra: NDArray[np.complex128], highest: int
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+) -> Floats:  # pragma: no cover  (compiled)
     """(n,) spectral arc lengths of (n, lines) spectra, up to the line ``highest``."""
     lengths = np.zeros(len(spectra))
     for k in range(len(spectra)):
@@ -104,21 +93,15 @@ def _arc_lengths(
     return lengths
 
 
-def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
-    """Computes the log dimensionless jerk (LDLJ), a measure of smoothness.
+def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> Floats:
+    """Computes the log dimensionless jerk (LDLJ) of speeds (..., n), a smoothness.
 
     The value is -ln(T^3 / v_peak^2 * J). T is the duration, v_peak is the largest
     speed, and J is the integral of the squared second derivative of the speed.
     Derivatives are plain differences (Balasubramanian et al. 2015). A less smooth
     motion has a more negative value.
 
-    Args:
-        speed: (..., n) speeds, m/s. No window may have a constant slope throughout;
-            this includes windows at rest.
-        rate_hz: Sample rate, Hz.
-
-    Returns:
-        (...) values, dimensionless.
+    No window may have a constant slope throughout; this includes windows at rest.
     """
     speed = np.asarray(speed, dtype=float)
     duration = speed.shape[-1] / rate_hz
@@ -127,16 +110,8 @@ def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float
     return -np.log(duration**3 / np.max(np.abs(speed), axis=-1) ** 2 * integral)
 
 
-def windows(values: ArrayLike, length: int) -> NDArray[np.float64]:
-    """Divides values into consecutive windows, and omits an incomplete last window.
-
-    Args:
-        values: (n,) values in any unit.
-        length: Number of values per window.
-
-    Returns:
-        (n // length, length) windows.
-    """
+def windows(values: ArrayLike, length: int) -> Floats:
+    """Divides values into windows (n, length), and omits an incomplete last window."""
     values = np.asarray(values, dtype=float)
     count = len(values) // length
     return values[: count * length].reshape(count, length)
@@ -145,12 +120,8 @@ def windows(values: ArrayLike, length: int) -> NDArray[np.float64]:
 def turn_reversals(turn_rate: ArrayLike, least: float) -> int:
     """Counts how often a body reverses its direction of turning.
 
-    Args:
-        turn_rate: (n,) turn rates, rad/s.
-        least: Least turn rate that counts as turning, rad/s.
-
-    Returns:
-        Number of reversals. A pause between two turns has no effect on this number.
+    Only turn rates of at least ``least`` count, rad/s. A pause between two turns has no
+    effect on the number.
     """
     rate = np.asarray(turn_rate, dtype=float)
     sides = np.sign(rate[np.abs(rate) >= least])

@@ -35,18 +35,11 @@ class TrackedBodies:
 
 
 def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
-    """Reconstructs the moving bodies that a robot with the guarded law has tracked.
+    """Reconstructs the bodies that a robot with the guarded law tracked at times in s.
 
     The guarded law is a control law that plans around moving bodies. For each time, the
-    function uses the nearest tick (control period). It uses no tick twice.
-
-    Args:
-        result: Result of a run, for one robot.
-        times: (n,) times, s.
-
-    Returns:
-        Tracks at these ticks. The value is None for any other law, and if
-        ``has_known_space`` is False.
+    function uses the nearest tick (control period). It uses no tick twice. The value is
+    None for any other law, and if ``has_known_space`` is False.
     """
     scenario, columns = result.scenario, result.columns
     if scenario.only.law != "guarded" or not has_known_space(result):

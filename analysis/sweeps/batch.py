@@ -51,17 +51,8 @@ def compares_laws(plan: SweepPlan) -> bool:
     return plan.pair and "law" in plan.grid and plan.cell_count <= MOST_CELLS
 
 
-def summarise(plan: SweepPlan, table: pd.DataFrame, name: str) -> Summary:
-    """Summarizes a sweep: its cells and, if it compares laws, pairs of its cells.
-
-    Args:
-        plan: Plan of the sweep.
-        table: Results of the sweep, from ``analysis.sweeps.store.load_results``.
-        name: Name of the scenario.
-
-    Returns:
-        The runs, their cells and pairs.
-    """
+def summarize(plan: SweepPlan, table: pd.DataFrame, name: str) -> Summary:
+    """Summarizes the results of a sweep, as ``load_results`` returns them."""
     scenario = scenario_from_mapping(plan.base)
     if "tick_s" not in table:  # else it is swept or drawn
         table = table.assign(tick_s=scenario.tick_s)
@@ -115,16 +106,8 @@ class PreparedBatch:
     def run(self, progress: Callable[[int], None] | None = None) -> Batch:
         """Does the runs, and summarizes the results of each scenario.
 
-        Args:
-            progress: Function that is called a few times per second with the number of
-                finished runs. If it raises an exception, the batch ends.
-
-        Returns:
-            Results of all scenarios.
-
-        Raises:
-            StoreError: The disk is full or faulty.
-            WorkerError: Worker processes cannot be started or reached.
+        See ``PreparedSweep.run``; ``progress`` gets the number of finished runs of all
+        scenarios.
         """
         summaries: dict[str, Summary] = {}
         before = 0
@@ -135,7 +118,7 @@ class PreparedBatch:
 
         for name, sweep in self.sweeps.items():
             table = sweep.run(partial(report, before))
-            summaries[name] = summarise(sweep.plan, table, name)
+            summaries[name] = summarize(sweep.plan, table, name)
             before += len(sweep.points)
         pooled = pooled_pairs(
             [(each.plan, each.rows) for each in summaries.values() if each.pairs]
@@ -168,21 +151,9 @@ def prepare_comparison(
 ) -> PreparedBatch:
     """Draws all layouts of a comparison, checks them, and opens the result directories.
 
-    A layout is one random variant of the positions and motions of all bodies.
-
-    Args:
-        plans: Plan of each scenario, by the scenario's name; see ``comparison_plan``.
-        out: Directory of the comparison. None means the next number under results/.
-        workers: Number of processes. None means one process per processor core.
-        resume: Whether ``out`` may contain runs of the same comparison. These runs are
-            kept.
-
-    Returns:
-        The comparison, which can be run once. Its directories are locked until then.
-
-    Raises:
-        InputError: An argument or a plan is not valid. The message states the fault and
-            the remedy.
+    A layout is one random variant of the positions and motions of all bodies. The plans
+    are those of ``comparison_plan``, by name of the scenario. For the other arguments,
+    see ``prepare_sweep``.
     """
     check_options(out, workers=workers, resume=resume)
     directory = Path(out).expanduser() if out is not None else None

@@ -1,4 +1,4 @@
-"""Cells of a sweep: rates and averages of all runs with the same values of the grid."""
+"""Cells of a sweep: rates, averages, and causes of failures of their runs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from analysis.reporting.intervals import (
     estimate_rate,
 )
 from analysis.runs.metric_table import METRICS, metric_label
-from analysis.sweeps.mechanisms import failure_mechanisms
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.run_rows import (
     WarningCount,
@@ -28,12 +27,19 @@ from analysis.sweeps.run_rows import (
     successes,
     warning_counts,
 )
+from diagrams.running.stop_rules import SUCCESSFUL
 
 ExampleKind = Literal["worst", "typical", "best"]
 EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
 #: MOST_BINS: greatest number of bins of a drawn number.
 #: LEAST_RUNS: least number of runs per bin, if there is more than one bin.
 MOST_BINS, LEAST_RUNS = 8, 20
+#: A body was out of sight if the time from its last echo to the contact is at least
+#: this number of ticks. Then there was no echo at the last tick.
+OUT_OF_SIGHT_TICKS = 1.5
+#: A body was heard late if its first echo came less than this time before the contact,
+#: s. At the top speed of 0.72 m/s, the robot travels 0.72 m in this time.
+LATE_S = 1.0
 #: Columns that are averaged like metrics.
 _TIMES = ("collision_time_s", "simulated_s")
 
@@ -79,14 +85,10 @@ class Quantity:
         return estimate_median(values)
 
     def text(self, estimate: Estimate, sign: str = "") -> str:
-        """Writes an estimate with its interval; rates are in percent.
+        """Writes an estimate in the form '82 (68, 91)', with rates in percent.
 
-        Args:
-            estimate: The estimate.
-            sign: ``+`` to write the sign of positive numbers, too.
-
-        Returns:
-            Text in the form '82 (68, 91)'; a dash without runs.
+        With the sign ``+``, positive numbers have a sign, too. Without runs, the text
+        is a dash.
         """
         if self.rate:
             return estimate.text(f"{sign}.0f", factor=100.0)
@@ -99,15 +101,8 @@ def quantities(
 ) -> list[Quantity]:
     """Returns the rates and metrics that pages show, without those that no run has.
 
-    Args:
-        rows: Results of the sweep.
-        pictures: Whether to return only the metrics that pictures show.
-        robot: Name of a robot, for its own metrics without rates. The default are the
-            rates and the metrics of all robots together.
-        seed: Seed of the sweep.
-
-    Returns:
-        The rates, then the metrics in the order of ``METRICS``.
+    With the name of a robot, the result contains the metrics of this robot and no
+    rates. Otherwise, it contains the rates and the metrics of all robots together.
     """
     prefix = f"{robot}." if robot else ""
     names = [
@@ -161,17 +156,7 @@ class Cell:
 def make_cell(
     scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int = 0
 ) -> Cell:
-    """Summarizes one cell of a sweep.
-
-    Args:
-        scenario: Name of the scenario.
-        fields: Values of the grid's fields, by dotted path.
-        rows: Results of the cell's runs, with the control period ``tick_s``, s.
-        seed: Seed of the sweep.
-
-    Returns:
-        Rates, averages, causes of the endings, and example runs.
-    """
+    """Summarizes the runs of a cell. Their rows need the control period ``tick_s``."""
     metrics = {
         name: estimate
         for name in rows.columns
@@ -225,6 +210,48 @@ def _mechanisms(rows: pd.DataFrame) -> dict[str, int]:
     return {str(name): int(count) for name, count in counts.items()}
 
 
+def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
+    """Names the mechanism by which each failed run failed; none for a success.
+
+    The rows are results of runs with range sensors, with the control period ``tick_s``
+    as an additional column.
+
+    The mechanism of a collision depends on the echoes of the body that the robot hit
+    (docs/results_laws.md):
+
+    - ``never heard``: The body returned no echo. It came from a direction outside the
+      sensor cones.
+    - ``out of sight``: The body returned echoes, but none at the last tick before the
+      contact (tick = control period). The body had left the cones.
+    - ``heard late``: The first echo came less than 1 s before the contact.
+    - ``pushed too little``: The body returned echoes in time and up to the contact.
+
+    The other failures have these mechanisms:
+
+    - ``jam``: The robot never reached the goal. It got stuck, or the time ran out.
+    - ``held off``: The robot reached the goal and got stuck later. The repulsion from
+      the source itself kept the robot outside.
+    - ``swings``: The robot reached the goal but did not come to rest there.
+    - ``lost``: The robot lost the source.
+    - ``astray``: The robot did not follow the moving source for long enough.
+    - ``diverged``: The robot drove too far from the source.
+    - ``no way found``: The control law reported that there is no path.
+    - ``failed``: The run raised an error.
+    """
+    cause = rows["cause"].astype("object")
+    names = cause.where(~cause.isin(SUCCESSFUL))
+    names = names.replace({"stuck": "jam", "timeout": "jam", "unsettled": "swings"})
+    came = np.isfinite(column(rows, "time_to_goal_s"))
+    names = names.mask((cause == "stuck") & came, "held off")
+    hits = cause == "collision"
+    warning, unseen = rows["contact_warning_s"], rows["contact_unseen_s"]
+    names = names.mask(hits, "pushed too little")
+    names = names.mask(hits & (warning < LATE_S), "heard late")
+    out_of_sight = unseen >= OUT_OF_SIGHT_TICKS * rows["tick_s"]
+    names = names.mask(hits & out_of_sight, "out of sight")
+    return names.mask(hits & warning.isna(), "never heard")
+
+
 @dataclass(frozen=True)
 class Marginal:
     """Estimates of a quantity as a function of one drawn field."""
@@ -245,17 +272,8 @@ def marginal(
 
     The runs are sorted into bins by the value of the field. If the field is a number,
     the bins have about the same number of runs. Otherwise, each possible value has a
-    bin.
-
-    Args:
-        plan: Plan of the parameter sweep.
-        key: Key of ``plan.draw``. If the key lists several paths, the first path
-            represents all of them.
-        runs: Results of the sweep.
-        quantity: Quantity to estimate.
-
-    Returns:
-        One estimate for each bin.
+    bin. If the key in ``plan.draw`` lists several paths, the first path represents all
+    of them.
     """
     path = key.partition(",")[0].strip()
     values = runs[path]
@@ -284,28 +302,13 @@ def by_cell(plan: SweepPlan, results: pd.DataFrame) -> list[pd.DataFrame]:
 
 
 def cell_label(fields: dict[str, Any]) -> str:
-    """Describes a cell of a grid, which is one combination of values, in a short text.
-
-    Args:
-        fields: Values of the grid's fields in this cell, by dotted path.
-
-    Returns:
-        Last part of each path with its value, or ``all runs`` if there are no fields.
-    """
+    """Describes a cell by the last part of each path and its value."""
     pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
     return ", ".join(pairs) or "all runs"
 
 
 def short(value: Any, most: int = 24) -> str:
-    """Writes a value as short text.
-
-    Args:
-        value: Plain value. Values other than texts are written as JSON.
-        most: Greatest length of the result, at least 4 characters.
-
-    Returns:
-        The text. If the text is too long, three dots replace its end.
-    """
+    """Writes a plain value in at most ``most`` characters; dots replace the end."""
     text = value if isinstance(value, str) else json.dumps(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 

@@ -47,27 +47,17 @@ def comparison_plan(
     """Plans the runs that compare control laws on the layouts of one scenario.
 
     A layout is one variant of the positions and motions of all bodies. Every law meets
-    the same layouts with the same seeds.
+    the same layouts with the same seeds. The other arguments are fields of
+    ``SweepPlan``.
 
-    Args:
-        scenario: One of three things. A library name selects layouts of the library. A
-            YAML file of layouts is a sweep file without ``grid``, ``runs`` and
-            ``pair``. A YAML file of a scenario has a single layout, and its runs differ
-            only in their random numbers.
-        laws: Laws to compare. Each run uses one law for all robots. None means the laws
-            of the papers and driving without avoidance. For a scenario with routes,
-            None means the laws for routes.
-        runs: Number of layouts. Every law meets each layout.
-        seed: Seed of all layouts and all noise.
-        settings: Values of other fields of the scenario, by dotted path.
-        grid: Lists of values of other fields to compare, by dotted path.
+    - A library name selects layouts of the library.
+    - A YAML file of layouts is a sweep file without ``grid``, ``runs`` and ``pair``.
+    - A YAML file of a scenario has a single layout, and its runs differ only in their
+      random numbers.
 
-    Returns:
-        Plan of the parameter sweep. ``law`` is the first field of its grid, and
-        ``pair`` is true.
-
-    Raises:
-        InputError: An argument is unknown or not valid. The message names the field.
+    Each run uses one law for all robots. By default, the laws are those of the papers
+    and driving without avoidance; for a scenario with routes, they are the laws for
+    routes.
     """
     plan = _layouts(scenario)
     base = scenario_from_mapping(plan.base)
@@ -120,26 +110,13 @@ def comparison_plans(
     settings: Iterable[str] = (),
     grid: Iterable[str] = (),
 ) -> dict[str, SweepPlan]:
-    """Plans a comparison of control laws for each scenario of a command line.
+    """Plans a comparison for each scenario of a command line, by name of the scenario.
 
-    Args:
-        scenarios: Names or files of scenarios; see ``comparison_plan``. An empty list
-            means the experiments of the papers.
-        laws: Names of laws, separated by commas. None means the default of
-            ``comparison_plan``.
-        velocity_terms: ``printed``, ``closing``, or both separated by a comma.
-        runs: Number of layouts per scenario. Each layout is a variant of the positions
-            and motions of all bodies.
-        seed: Whole number as text. None means the default seed.
-        settings: Values of other fields, each in the form ``key=value``.
-        grid: Lists of values to compare, each in the form ``key=[value, ...]``.
-
-    Returns:
-        Plans in the order of ``scenarios``. The key of a plan is the scenario's name,
-        without folder and file ending.
-
-    Raises:
-        InputError: An argument is not valid. The message names the option or the field.
+    The name has neither folder nor file ending. Without scenarios, the plans are those
+    for the experiments of the papers. All other arguments are options of the command;
+    lists are separated by commas, and settings have the form ``key=value``. For the
+    defaults, see ``comparison_plan``. Raises InputError, which names the option or the
+    field, if an argument is not valid.
     """
     fields = dict(parse_setting(text) for text in settings)
     varied = dict(_listed_values(text) for text in grid)

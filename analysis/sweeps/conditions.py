@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -34,15 +33,7 @@ class Conditions(Parameters):
     origin of B."""
 
     def check(self, scenario: Scenario) -> None:
-        """Checks whether a layout fulfills the conditions.
-
-        Args:
-            scenario: Scenario with the layout.
-
-        Raises:
-            InputError: The layout violates a condition. The message names the
-                condition.
-        """
+        """Raises InputError, with the condition's name, if a layout violates it."""
         if self == Conditions():
             return
         self._check_source(scenario)
@@ -99,7 +90,8 @@ class Conditions(Parameters):
         reach = own.follow_distance_m + own.robot.control_point_m
         boxes = tuple(
             tuple(body.rectangle(0.0).tolist())
-            for _, body in _resting(around.obstacles)
+            for body in around.obstacles.values()
+            if not body.path.moves
         )
         start = own.start.position_m
         if not _has_way(start, goal, reach, boxes, self.way_radius_m):
@@ -109,10 +101,6 @@ class Conditions(Parameters):
                 f"m from the start of {robot!r} to {around.target!r}; move some of "
                 "them, or lower the radius",
             )
-
-
-def _resting(bodies: Mapping[str, Body]) -> Iterator[tuple[str, Body]]:
-    return ((name, body) for name, body in bodies.items() if not body.path.moves)
 
 
 # Cells of a grid that share their draws repeat the same question.

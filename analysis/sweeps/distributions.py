@@ -9,13 +9,7 @@ import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from systems.framework.input_error import InputError
-from systems.framework.parameters import (
-    Angle,
-    Coordinate,
-    Length,
-    Parameters,
-    Point,
-)
+from systems.framework.parameters import Angle, Coordinate, Length, Parameters, Point
 
 #: Limits of the numbers. The difference of two floats within the limits is finite.
 #: Integers within the limits are exact as floats.
@@ -30,6 +24,13 @@ BoxCount = Annotated[int, Field(ge=0, le=100)]
 BoxCounts = Annotated[tuple[BoxCount, BoxCount], Strict(False)]
 Span = Annotated[tuple[Coordinate, Coordinate], Strict(False)]
 Sides = Annotated[tuple[Length, Length], Strict(False)]
+
+
+def _require_order(name: str, span: tuple[float, float]) -> None:
+    if span[0] > span[1]:
+        raise InputError(
+            name, f"{list(span)} is empty; give [low, high] with low <= high"
+        )
 
 
 class Boxes(Parameters):
@@ -47,22 +48,12 @@ class Boxes(Parameters):
 
     @model_validator(mode="after")
     def _check(self) -> Boxes:
-        for name, (low, high) in self:
-            if low > high:
-                raise InputError(
-                    name, f"{[low, high]} is empty; give [low, high] with low <= high"
-                )
+        for name, span in self:
+            _require_order(name, span)
         return self
 
     def draw(self, generator: np.random.Generator) -> list[dict[str, Any]]:
-        """Draws boxes for the field ``obstacles`` of a scenario; the boxes may overlap.
-
-        Args:
-            generator: Generator of random numbers.
-
-        Returns:
-            Fields of ``ObstacleParameters`` for each box. Each box has its own name.
-        """
+        """Draws boxes for the field ``obstacles``; the boxes may overlap."""
         count = int(generator.integers(*self.count, endpoint=True))
         ranges = (self.x_m, self.y_m, (-180.0, 180.0), self.side_m, self.side_m)
         low, high = np.array(ranges).T
@@ -91,23 +82,12 @@ class Sector(Parameters):
 
     @model_validator(mode="after")
     def _check(self) -> Sector:
-        for name in ("range_m", "bearing_deg"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise InputError(
-                    name, f"{[low, high]} is empty; give [low, high] with low <= high"
-                )
+        _require_order("range_m", self.range_m)
+        _require_order("bearing_deg", self.bearing_deg)
         return self
 
     def draw(self, generator: np.random.Generator) -> list[float]:
-        """Draws a position.
-
-        Args:
-            generator: Generator of random numbers.
-
-        Returns:
-            [x, y] of the position in the world frame W, m.
-        """
+        """Draws [x, y] of a position in the world frame W, m."""
         low, high = self.range_m
         distance = math.sqrt(generator.uniform(low**2, high**2))
         bearing = math.radians(generator.uniform(*self.bearing_deg))
@@ -168,10 +148,8 @@ class Distribution(Parameters):
                 f"the standard deviation {values[1]:g} must be positive; "
                 "give [mean, standard deviation]",
             )
-        if name == "integers" and values[0] > values[1]:
-            raise InputError(
-                name, f"{list(values)} is empty; give [low, high] with low <= high"
-            )
+        if name == "integers":
+            _require_order(name, values)
         for change in _CHANGES:
             if getattr(self, change) is not None and not self.numeric:
                 raise InputError(
@@ -191,15 +169,9 @@ class Distribution(Parameters):
         return self.choice is None and self.boxes is None and self.sector is None
 
     def draw(self, generator: np.random.Generator, count: int = 1) -> list[Any]:
-        """Draws one value, and derives from it the values of one or several fields.
+        """Draws one value, and derives from it the plain values of ``count`` fields.
 
-        Args:
-            generator: Generator of random numbers.
-            count: Number of fields. If ``each`` is set, it has one entry for each
-                field.
-
-        Returns:
-            Value for each field, as plain Python types.
+        If ``each`` is set, it has one entry for each field.
         """
         if self.boxes is not None:
             return [self.boxes.draw(generator)] * count

@@ -86,15 +86,7 @@ def run_task(task: Task) -> Outcome:
 
 
 def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
-    """Rejects results in which every run failed.
-
-    Args:
-        tables: Results of each parameter sweep, from ``load_results``.
-        out: Directory of the results, for the message.
-
-    Raises:
-        RunError: Every run failed. The message states the error of the first run.
-    """
+    """Raises RunError with the error of the first run if every run failed."""
     causes = [cause for table in tables for cause in table["cause"]]
     if causes and all(cause == FAILED for cause in causes):
         raise RunError(
@@ -104,15 +96,7 @@ def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
 
 
 def lost_outcome(task: Task, reason: str) -> Outcome:
-    """Makes the result of a run whose worker ended at every attempt.
-
-    Args:
-        task: Task that the worker did not complete.
-        reason: Reason why the worker ended.
-
-    Returns:
-        Result of a failed run with ``reason`` as its error.
-    """
+    """Makes the result of a run whose worker ended at every attempt."""
     return Outcome(_row(task, FAILED, perf_counter(), error=reason))
 
 
@@ -180,12 +164,6 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     - Metrics and times are float64. A missing number is NaN.
     - Warnings are JSON text.
     - A field is JSON text if its values are lists or mappings, or have different types.
-
-    Args:
-        rows: Rows of ``Outcome``, in any order.
-
-    Returns:
-        One row for each run.
     """
     ordered = sorted(rows, key=lambda row: int(row["index"]))
     columns: dict[str, Any] = {

@@ -18,17 +18,7 @@ def check_options(
     scheduler: str | None = None,
     resume: bool = False,
 ) -> None:
-    """Checks the options of a parameter sweep before anything is computed.
-
-    Args:
-        out: Directory of the results. None means the next number under results/.
-        workers: Number of local processes. None means one process per processor core.
-        scheduler: Address of a Dask scheduler. None means local processes.
-        resume: Whether ``out`` may contain runs of the same plan.
-
-    Raises:
-        InputError: An option is not valid, or two options exclude each other.
-    """
+    """Raises InputError if an option is not valid, or if two exclude each other."""
     if workers is not None and not 1 <= workers <= MOST_WORKERS:
         raise InputError("workers", f"{workers} must lie between 1 and {MOST_WORKERS}")
     if scheduler is not None and workers is not None:

@@ -10,21 +10,22 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from markupsafe import Markup
+from matplotlib.figure import Figure as Drawing
 
-from analysis.reporting.html_page import (
-    definitions,
-    figure_html,
-    file_links,
-    heading,
-    note,
-    paragraph,
-    picture,
-    section,
-    table,
-)
 from analysis.reporting.plain_values import write_json
-from analysis.reporting.render import page
-from analysis.reporting.section import Cell as TableCell
+from analysis.reporting.render import heading, html, page
+from analysis.reporting.section import (
+    Cell as TableCell,
+    Content,
+    Definitions,
+    Figure,
+    Files,
+    Note,
+    Picture,
+    Section,
+    Table,
+)
 from analysis.sweeps.batch import MOST_CELLS, REPORT, SUMMARY, Batch, Summary
 from analysis.sweeps.cells import LEAST_RUNS, by_cell, cell_label
 from analysis.sweeps.examples import picture_files, write_examples
@@ -55,12 +56,7 @@ MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
 
 
 def write_batch(batch: Batch, document: dict[str, Any]) -> None:
-    """Writes the JSON document, the page and the examples into the batch's directory.
-
-    Args:
-        batch: Results of the batch.
-        document: JSON document from ``batch_document``.
-    """
+    """Writes the JSON document, the page and the examples to the batch's directory."""
     write_json(document, batch.out / SUMMARY)
     write_examples(batch)
     (batch.out / REPORT).write_text(batch_page(batch, document), "utf-8")
@@ -72,15 +68,8 @@ def batch_page(batch: Batch, document: dict[str, Any]) -> str:
     The page of a single sweep has a section for each kind of result. The page of a
     comparison has a section for each scenario. The page shows the pictures and replays
     that exist in the directory of the batch.
-
-    Args:
-        batch: Results of the batch.
-        document: JSON document from ``batch_document``.
-
-    Returns:
-        HTML.
     """
-    parts = {"Summary": _about(batch, document)}
+    parts: dict[str, Sequence[Content]] = {"Summary": _about(batch, document)}
     for k, (name, each) in enumerate(batch.summaries.items()):
         own = _scenario(batch, each, document, f"s{k}")
         if len(batch.summaries) == 1:
@@ -88,12 +77,8 @@ def batch_page(batch: Batch, document: dict[str, Any]) -> str:
         else:
             parts[name] = [
                 *_warnings(each),
-                definitions(_plan_rows(each.plan, each.rows)),
-                *(
-                    x
-                    for title, inner in own.items()
-                    for x in (heading(3, title), *inner)
-                ),
+                Definitions(_plan_rows(each.plan, each.rows)),
+                *(x for title, inner in own.items() for x in (heading(title), *inner)),
             ]
     if batch.pooled and len(batch.summaries) > 1:
         parts["All together"] = [_table(pair_rows(batch.pooled), _PAIRS)]
@@ -101,7 +86,10 @@ def batch_page(batch: Batch, document: dict[str, Any]) -> str:
     return page(
         batch.title,
         [(anchors[title], title) for title in parts],
-        [section(anchors[title], title, inner) for title, inner in parts.items()],
+        [
+            html(Section(anchors[title], title, inner), anchors[title])
+            for title, inner in parts.items()
+        ],
     )
 
 
@@ -110,7 +98,7 @@ _PAIRS = "Pairs of runs on the same layouts; differences, first less second"
 
 def _scenario(
     batch: Batch, summary: Summary, document: dict[str, Any], prefix: str
-) -> dict[str, list[str]]:
+) -> dict[str, list[Content]]:
     """Parts of the page about one scenario, by title, without empty parts.
 
     The prefix distinguishes its figures from those of other scenarios.
@@ -118,7 +106,7 @@ def _scenario(
     plan, rows = summary.plan, summary.rows
     few = plan.cell_count <= MOST_CELLS
     cells = {"How the runs ended": _endings(summary)}
-    parts = {
+    parts: dict[str, list[Content]] = {
         **(cells if few else {}),
         "Over the grid": _maps(plan, rows, prefix),
         "In pairs": [_table(pair_rows(summary.pairs), _PAIRS)] if summary.pairs else [],
@@ -133,7 +121,7 @@ def _scenario(
     return {title: inner for title, inner in parts.items() if inner}
 
 
-def _about(batch: Batch, document: dict[str, Any]) -> list[str]:
+def _about(batch: Batch, document: dict[str, Any]) -> list[Content]:
     plan = next(iter(batch.summaries.values())).plan
     draws = "all cells have equal" if plan.pair else "each cell has its own"
     count = sum(len(each.cells) for each in batch.summaries.values())
@@ -142,7 +130,7 @@ def _about(batch: Batch, document: dict[str, Any]) -> list[str]:
         ("Runs", f"{document['runs']}: {plan.runs} in each of {count} cells"),
         ("Seed", f"{plan.seed}; {draws} draws"),
     ]
-    parts = []
+    parts: list[Content] = []
     if len(batch.summaries) == 1:
         (only,) = batch.summaries.values()
         rows += _plan_rows(only.plan, only.rows)
@@ -155,14 +143,14 @@ def _about(batch: Batch, document: dict[str, Any]) -> list[str]:
     ]
     return [
         *parts,
-        definitions(rows),
-        paragraph(
+        Definitions(rows),
+        (
             "Brackets and bars are 95 % intervals: Wilson's for rates, order "
             "statistics for medians. A run that raised an error counts as a run "
             "without success and without collision. docs/metrics.md states which runs "
             "the average of each metric includes."
         ),
-        file_links([("summary.json", "the numbers of this page, for programs")]),
+        Files([("summary.json", "the numbers of this page, for programs")]),
     ]
 
 
@@ -178,8 +166,8 @@ def _plan_rows(plan: SweepPlan, rows: pd.DataFrame) -> list[tuple[str, str]]:
     ]
 
 
-def _warnings(summary: Summary) -> list[str]:
-    return [note(text) for text in warning_lines(summary)]
+def _warnings(summary: Summary) -> list[Content]:
+    return [Note(text) for text in warning_lines(summary)]
 
 
 def _listed(fields: dict[str, Any]) -> str:
@@ -187,7 +175,7 @@ def _listed(fields: dict[str, Any]) -> str:
     return "; ".join(pairs) or "nothing"
 
 
-def _table(rows: Sequence[Sequence[str]], caption: str) -> str:
+def _table(rows: Sequence[Sequence[str]], caption: str) -> Table:
     """A table of texts, in whose numbers and intervals no line breaks."""
 
     def whole(text: str) -> str:
@@ -195,10 +183,10 @@ def _table(rows: Sequence[Sequence[str]], caption: str) -> str:
         return text.replace(", ", ",\u00a0")
 
     body = [[row[0], *map(whole, row[1:])] for row in rows[1:]]
-    return table(rows[0], body, caption=caption)
+    return Table(rows[0], body, caption)
 
 
-def _endings(summary: Summary) -> list[str]:
+def _endings(summary: Summary) -> list[Content]:
     order = summary.rows["cause"].value_counts().index
     good = [cause for cause in SUCCESSFUL if cause in order]
     causes = [*good, *(cause for cause in order if cause not in good)]
@@ -210,8 +198,8 @@ def _endings(summary: Summary) -> list[str]:
         counts = [int((runs["cause"] == cause).sum()) for cause in causes]
         counts += [int((runs["warnings"] != "[]").sum()) for _ in warned]
         rows.append([cell.label, cell.runs, *counts])
-    parts = [
-        table(["cell", "runs", *causes, *warned], rows, caption="Runs by cause"),
+    parts: list[Content] = [
+        Table(["cell", "runs", *causes, *warned], rows, "Runs by cause"),
         _table(estimate_rows(summary), "Rates and metrics with 95 % intervals"),
     ]
     if robots := robot_rows(summary):
@@ -229,29 +217,32 @@ def _endings(summary: Summary) -> list[str]:
             for cell in summary.cells
         ]
         head = ["cell", "collisions, by fault", "why runs failed"]
-        parts.append(table(head, why, caption="Failures"))
+        parts.append(Table(head, why, "Failures"))
     return parts
 
 
-def _maps(plan: SweepPlan, results: pd.DataFrame, prefix: str) -> list[str]:
+def _figure(figure: Drawing, name: str, caption: str, *, scale: bool = False) -> Markup:
+    """Draws a figure of the page; each name may occur once on a page."""
+    return html(Figure(lambda: figure, caption, scale), name)
+
+
+def _maps(plan: SweepPlan, results: pd.DataFrame, prefix: str) -> list[Content]:
     axes = grid_axes(plan)
     if not axes:
         return []
     if len(axes) == 1 and len(plan.grid) == 1:
         if any(isinstance(value, str) for value in plan.grid[axes[0]]):
             caption = f"Every metric for each `{axes[0]}`."
-            return [figure_html(plot_cells(plan, results), f"{prefix}cells", caption)]
+            return [_figure(plot_cells(plan, results), f"{prefix}cells", caption)]
         caption = f"Every metric over `{axes[0]}`."
-        return [
-            figure_html(plot_line(plan, results, axes[0]), f"{prefix}line", caption)
-        ]
+        return [_figure(plot_line(plan, results, axes[0]), f"{prefix}line", caption)]
     (x, y), others = _map_axes(plan)
     cases = [
         dict(zip(others, values, strict=True))
         for values in product(*(plan.grid[path] for path in others))
     ]
-    maps = [
-        figure_html(
+    maps: list[Content] = [
+        _figure(
             plot_heat_maps(plan, results, x, y, rest),
             f"{prefix}map{k}",
             f"Every metric over `{x}` and `{y}`; lighter means more: "
@@ -261,7 +252,7 @@ def _maps(plan: SweepPlan, results: pd.DataFrame, prefix: str) -> list[str]:
         for k, rest in enumerate(cases[:MOST_MAPS])
     ]
     if len(cases) > MOST_MAPS:
-        maps.append(paragraph(f"{len(cases) - MOST_MAPS} further maps are left out."))
+        maps.append(f"{len(cases) - MOST_MAPS} further maps are left out.")
     return maps
 
 
@@ -272,9 +263,9 @@ def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
     return chosen, [path for path in plan.grid if path not in chosen]
 
 
-def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
+def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
     return [
-        figure_html(
+        _figure(
             plot_marginal(plan, results, key),
             f"marginal{k}",
             f"Every metric over `{key}`, in bins with equal numbers of runs.",
@@ -286,7 +277,9 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
     ]
 
 
-def _examples(batch: Batch, summary: Summary, document: dict[str, Any]) -> list[str]:
+def _examples(
+    batch: Batch, summary: Summary, document: dict[str, Any]
+) -> list[Content]:
     """Picture, commands and existing replays of the examples of a scenario."""
     file = picture_files(batch)[summary.name]
     cells = [
@@ -309,14 +302,14 @@ def _examples(batch: Batch, summary: Summary, document: dict[str, Any]) -> list[
             replay = str(Path(example["scenario_file"]).with_suffix(".html"))
             if (batch.out / replay).is_file():
                 replays.append((replay, f"{who}, to watch"))
-    shown = [picture(file, caption)] if (batch.out / file).is_file() else []
-    links = [file_links(replays)] if replays else []
-    return [*shown, definitions(lines), *links]
+    shown = [Picture(file, caption)] if (batch.out / file).is_file() else []
+    links = [Files(replays)] if replays else []
+    return [*shown, Definitions(lines), *links]
 
 
-def _commands(batch: Batch, summary: Summary) -> list[str]:
+def _commands(batch: Batch, summary: Summary) -> list[Content]:
     """Commands that repeat the first failed runs of each cause, errors first."""
-    parts = [paragraph("Each command repeats one run and makes its replay.")]
+    parts: list[Content] = ["Each command repeats one run and makes its replay."]
     rows = summary.rows
     causes = [c for c in rows["cause"].value_counts().index if c not in SUCCESSFUL]
     for cause in sorted(causes, key=lambda cause: cause != FAILED):
@@ -332,7 +325,7 @@ def _commands(batch: Batch, summary: Summary) -> list[str]:
             )
             for row in runs.head(most).to_dict("records")
         ]
-        parts += [heading(3, caption), definitions(lines)]
+        parts += [heading(caption), Definitions(lines)]
     return parts if causes else []
 
 

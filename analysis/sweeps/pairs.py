@@ -80,29 +80,23 @@ class Pair:
 def pairs_of(plan: SweepPlan, rows: pd.DataFrame, scenario: str) -> list[Pair]:
     """Compares each two cells of a paired sweep that differ in exactly one field.
 
-    Args:
-        plan: Plan of the sweep.
-        rows: Results of the sweep, sorted by layout in each cell.
-        scenario: Name of the scenario.
-
-    Returns:
-        One comparison for each pair of cells.
+    The rows of each cell must be sorted by layout.
     """
-    return [_pair(scenario, each) for each in _neighbours(plan, rows)]
+    return [_pair(scenario, each) for each in _neighbors(plan, rows)]
 
 
 def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]:
     """Compares each pair of values of a field over several scenarios together."""
-    groups: dict[tuple[str, str, str], list[_Neighbours]] = {}
+    groups: dict[tuple[str, str, str], list[_Neighbors]] = {}
     for plan, rows in sweeps:
-        for one in _neighbours(plan, rows):
+        for one in _neighbors(plan, rows):
             key = (one.field, str(one.first), str(one.second))
             groups.setdefault(key, []).append(one)
     return [_pair("all", _joined(group)) for group in groups.values()]
 
 
 @dataclass(frozen=True)
-class _Neighbours:
+class _Neighbors:
     """Runs of two cells that differ in one field, in the same order of layouts."""
 
     field: str
@@ -113,17 +107,17 @@ class _Neighbours:
     second_rows: pd.DataFrame
 
 
-def _neighbours(plan: SweepPlan, rows: pd.DataFrame) -> Iterator[_Neighbours]:
+def _neighbors(plan: SweepPlan, rows: pd.DataFrame) -> Iterator[_Neighbors]:
     cells = list(zip(plan.cells(), by_cell(plan, rows), strict=True))
     for (one, ones), (other, others) in combinations(cells, 2):
         apart = [key for key in one if one[key] != other[key]]
         if len(apart) == 1:
             field = apart[0]
             common = {key: value for key, value in one.items() if key != field}
-            yield _Neighbours(field, one[field], other[field], common, ones, others)
+            yield _Neighbors(field, one[field], other[field], common, ones, others)
 
 
-def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
+def _joined(group: Sequence[_Neighbors]) -> _Neighbors:
     return replace(
         group[0],
         fields={},
@@ -132,7 +126,7 @@ def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
     )
 
 
-def _pair(scenario: str, runs: _Neighbours) -> Pair:
+def _pair(scenario: str, runs: _Neighbors) -> Pair:
     first, second = runs.first_rows, runs.second_rows
     both = successes(first) & successes(second)
     met = both & _pushed(first) & _pushed(second)
@@ -172,18 +166,10 @@ def paired_rate(
 ) -> PairedRate:
     """Compares how often two methods have an outcome, for example a collision.
 
-    Both methods run on the same n layouts. The confidence interval is the adjusted Wald
-    interval of Bonett and Price (2012). This interval keeps its coverage even for rare
-    outcomes and small samples.
-
-    Args:
-        first: (n,) whether the first method had the outcome on each layout, n >= 1.
-        second: (n,) whether the second method had the outcome on each layout.
-        level: Confidence level of the interval.
-
-    Returns:
-        Difference of the two rates, from -1 to 1, with its confidence interval. The
-        result also contains the p-value of the exact McNemar test.
+    The flags (n,) of each method tell whether it had the outcome on each of the same n
+    layouts, n >= 1. The confidence interval is the adjusted Wald interval of Bonett and
+    Price (2012). This interval keeps its coverage even for rare outcomes and small
+    samples. The p-value is that of the exact McNemar test.
     """
     from scipy.stats import binomtest, norm
 
@@ -192,13 +178,13 @@ def paired_rate(
     apart, pairs = only_first + only_second, len(a)
     p_value = binomtest(only_first, apart).pvalue if apart else 1.0
     up, down = (only_first + 1) / (pairs + 2), (only_second + 1) / (pairs + 2)
-    centre = up - down
-    spread = math.sqrt((up + down - centre**2) / (pairs + 2))
+    center = up - down
+    spread = math.sqrt((up + down - center**2) / (pairs + 2))
     half = float(norm.ppf(0.5 + level / 2.0)) * spread
     difference = Estimate(
         (only_first - only_second) / pairs,
-        max(centre - half, -1.0),
-        min(centre + half, 1.0),
+        max(center - half, -1.0),
+        min(center + half, 1.0),
         pairs,
         level,
     )
@@ -208,19 +194,10 @@ def paired_rate(
 def paired_median(
     first: ArrayLike, second: ArrayLike, *, level: float = LEVEL
 ) -> PairedMedian | None:
-    """Compares the values of a metric between two methods.
+    """Compares the values (n,) of a metric between two methods on the same n layouts.
 
-    Both methods run on the same n layouts.
-
-    Args:
-        first: (n,) values of the first method. NaN if a run has no value.
-        second: (n,) values of the second method. NaN if a run has no value.
-        level: Confidence level of the interval.
-
-    Returns:
-        Medians, and the interval of the median difference, in the unit of the metric.
-        The result also contains the p-value of the Wilcoxon signed-rank test. The
-        result is None if no layout has values of both methods.
+    A run without a value has NaN. The p-value is that of the Wilcoxon signed-rank test.
+    The result is None if no layout has values of both methods.
     """
     from scipy.stats import wilcoxon
 

@@ -311,17 +311,10 @@ class SweepPlan(Parameters):
 
 
 def load_sweep(path: str | Path) -> SweepPlan:
-    """Loads the plan of a parameter sweep from a file.
+    """Loads the plan of a parameter sweep from a YAML file.
 
-    Args:
-        path: YAML file with the fields of ``SweepPlan``. Relative paths in the file
-            start in its folder.
-
-    Returns:
-        The plan.
-
-    Raises:
-        InputError: The file cannot be read, or a field is unknown or not valid.
+    Relative paths in the file start in its folder. Raises InputError if the file cannot
+    be read, or if a field is unknown or not valid.
     """
     data = read_sweep(path)
     try:
@@ -360,13 +353,8 @@ def _state_lists(
 ) -> None:
     """Adds lists to the fields of a scenario, so that their elements can be set later.
 
-    A list is added if a path leads into the list and the fields do not contain it yet.
+    A list is added if a path leads into the list and ``data`` does not contain it yet.
     The added list has its value from ``scenario``.
-
-    Args:
-        data: Fields of a scenario, changed in place.
-        scenario: Scenario with these fields.
-        paths: Dotted paths of the fields to set later.
     """
     whole = scenario.model_dump(mode="json")
     for group in ("robots", "sources"):

@@ -29,7 +29,7 @@ WIDTH_IN = 9.0
 #: MOST_TICKS: greatest number of values that an axis shows.
 MOST_NUMBERS, MOST_TICKS = 8, 20
 #: Colors of curves, after Okabe and Ito. Color-blind people can distinguish them.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#A8498A")
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#A8498A")
 
 
 def grid_axes(plan: SweepPlan) -> list[str]:
@@ -40,18 +40,10 @@ def grid_axes(plan: SweepPlan) -> list[str]:
 def plot_heat_maps(
     plan: SweepPlan, results: pd.DataFrame, x: str, y: str, rest: dict[str, Any]
 ) -> Figure:
-    """Draws a heat map of each quantity over two fields of the grid.
+    """Draws a heat map of each quantity over two fields of the grid, x and y.
 
-    Args:
-        plan: Plan of the parameter sweep.
-        results: Results of the sweep, from ``load_results``.
-        x: Dotted path of the field along the horizontal axis.
-        y: Dotted path of the field along the vertical axis.
-        rest: Values of the grid's other fields, by dotted path.
-
-    Returns:
-        Picture with one panel for each quantity. Lighter cells have larger values.
-        Cells without an estimate are hatched.
+    The other fields of the grid have the values ``rest``. Lighter cells have larger
+    values. Cells without an estimate are hatched.
     """
     runs, cells = by_cell(plan, results), plan.cells()
     chosen = [
@@ -126,9 +118,9 @@ def _heat_map(
         if not quantity.rate and not math.isnan(value):
             text = f"{value:.3g}"
         dark = not math.isnan(value) and luminance(image.to_rgba(value)) < 0.18
-        colour = "white" if dark else "black"
+        color = "white" if dark else "black"
         axes.text(
-            column, row, text, ha="center", va="center", color=colour, fontsize=size
+            column, row, text, ha="center", va="center", color=color, fontsize=size
         )
 
 
@@ -148,15 +140,7 @@ def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
 
 
 def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
-    """Draws each quantity of each cell, with 95 % intervals.
-
-    Args:
-        plan: Plan of the parameter sweep.
-        results: Results of the sweep, from ``load_results``.
-
-    Returns:
-        Picture with one panel for each quantity, and one row for each cell.
-    """
+    """Draws each quantity of each cell in a row of its own, with 95 % intervals."""
     labels = [cell_label(fields) for fields in plan.cells()]
     places = np.arange(len(labels), dtype=float)
     figure, panels = _panels(results, 0.9 + 0.32 * len(labels))
@@ -164,10 +148,10 @@ def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
         estimates = [quantity.estimate(runs) for runs in by_cell(plan, results)]
         if quantity.rate:
             values = [each.value for each in estimates]
-            axes.barh(places, values, color=COLOURS[0], alpha=0.4, height=0.6)
+            axes.barh(places, values, color=COLORS[0], alpha=0.4, height=0.6)
             axes.set_xlim(0.0, 1.0)
             axes.xaxis.set_major_formatter(PercentFormatter(1.0))
-        _errorbars(axes, places, estimates, COLOURS[0], "", across=True)
+        _errorbars(axes, places, estimates, COLORS[0], "", across=True)
         axes.set_yticks(places, labels if k % 2 == 0 else [""] * len(labels))
         axes.set_ylim(len(labels) - 0.5, -0.5)
         axes.set_title(quantity.label, fontsize=10)
@@ -176,44 +160,27 @@ def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
 
 
 def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
-    """Draws each quantity over the only field of the grid, with 95 % intervals.
-
-    Args:
-        plan: Plan of the parameter sweep, whose grid has one field.
-        results: Results of the sweep, from ``load_results``.
-        x: Dotted path of this field.
-
-    Returns:
-        Picture with one panel for each quantity, for example the success rate.
-    """
+    """Draws each quantity over the only field of the grid, with 95 % intervals."""
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
         estimates = [quantity.estimate(runs) for runs in by_cell(plan, results)]
         places = np.arange(len(estimates), dtype=float)
-        _errorbars(axes, places, estimates, COLOURS[0], "")
+        _errorbars(axes, places, estimates, COLORS[0], "")
         _frame(axes, quantity)
         _ticks(axes, "x", x, plan.grid[x])
     return figure
 
 
 def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
-    """Draws each quantity as a function of one randomly drawn field.
+    """Draws each quantity as a function of one drawn field, a key of ``plan.draw``.
 
     If a field of the grid has few enough values, the picture has one curve for each of
     these values. If several fields have, the first field is used. Each curve combines
     the runs over all other fields.
-
-    Args:
-        plan: Plan of the parameter sweep.
-        results: Results of the sweep, from ``load_results``.
-        key: Key of the drawn field in ``plan.draw``.
-
-    Returns:
-        Picture with one panel for each quantity.
     """
     runs = results
     split = next(
-        (path for path in grid_axes(plan) if len(plan.grid[path]) <= len(COLOURS)), None
+        (path for path in grid_axes(plan) if len(plan.grid[path]) <= len(COLORS)), None
     )
     groups = {"all runs": runs}
     if split is not None:
@@ -226,11 +193,11 @@ def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
         }
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
-        for (label, group), colour in zip(groups.items(), COLOURS, strict=False):
+        for (label, group), color in zip(groups.items(), COLORS, strict=False):
             if group.empty:
                 continue
             found = marginal(plan, key, group, quantity)
-            _errorbars(axes, found.places, found.estimates, colour, label)
+            _errorbars(axes, found.places, found.estimates, color, label)
             if found.labels:
                 axes.set_xticks(found.places, found.labels, fontsize=7, rotation=30)
         axes.set_xlabel(key.partition(",")[0], fontsize=9)
@@ -248,7 +215,7 @@ def _errorbars(
     axes: Axes,
     places: np.ndarray,
     estimates: Sequence[Estimate],
-    colour: str,
+    color: str,
     label: str,
     *,
     across: bool = False,
@@ -261,7 +228,7 @@ def _errorbars(
         places if across else value,
         xerr=spread if across else None,
         yerr=None if across else spread,
-        color=colour,
+        color=color,
         label=label,
         linestyle="none" if across else "-",
         marker="o",

@@ -80,16 +80,7 @@ def batch_document(batch: Batch) -> dict[str, Any]:
 
 
 def run_command(batch: Batch, scenario: str, row: Mapping[Any, Any]) -> str:
-    """Returns the shell command that repeats a run.
-
-    Args:
-        batch: Results of the batch.
-        scenario: Name of the run's scenario.
-        row: Row of the run in the results.
-
-    Returns:
-        Command in one line, with quotes for the shell.
-    """
+    """Returns the shell command that repeats the run of a row in the results."""
     sweep = batch.sweeps[scenario]
     return reproducing_command(
         sweep.store.out, sweep.points[row["index"]], row["engine"]
@@ -97,15 +88,7 @@ def run_command(batch: Batch, scenario: str, row: Mapping[Any, Any]) -> str:
 
 
 def batch_text(batch: Batch, document: dict[str, Any]) -> str:
-    """Makes tables of a batch for a terminal, without a newline after the last line.
-
-    Args:
-        batch: Results of the batch.
-        document: JSON document from ``batch_document``.
-
-    Returns:
-        Lines of text.
-    """
+    """Makes tables of a batch for a terminal, without a newline after the last line."""
     lines = ["Brackets are 95 % intervals.", ""]
     for name, each in batch.summaries.items():
         lines += [f"{name}:"] if len(batch.summaries) > 1 else []
@@ -160,15 +143,7 @@ def _text_of(cell: Cell, quantity: Quantity) -> str:
 
 
 def pair_rows(pairs: Sequence[Pair], *, pictures: bool = False) -> list[list[str]]:
-    """A heading, and one row with the differences of each pair.
-
-    Args:
-        pairs: At least one pair.
-        pictures: Whether to show only the metrics that pictures show.
-
-    Returns:
-        Rows of texts, all of the same length.
-    """
+    """A heading, and one row with the differences of each of at least one pair."""
     shown = [
         Quantity(name)
         for name, metric in METRICS.items()

@@ -40,14 +40,7 @@ def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
 
     ``Metric.robots`` states how the values of several robots become one value of their
     run. If one robot has no value of a metric in a run, the value for all robots is
-    NaN.
-
-    Args:
-        table: Results of the sweep, from ``analysis.sweeps.store.load_results``.
-        robots: Names of the robots. With one robot, the table already has the metrics.
-
-    Returns:
-        The table with the added columns. With one robot, the table is unchanged.
+    NaN. With one robot, the table already has the metrics.
     """
     if len(robots) < 2:
         return table
@@ -71,15 +64,10 @@ class WarningCount:
 
 
 def warning_counts(rows: pd.DataFrame) -> list[WarningCount]:
-    """Counts the warnings of many runs, for each field of the scenario.
+    """Counts the warnings of runs by field of the scenario, the most frequent first.
 
-    Args:
-        rows: Table of runs. The column ``warnings`` contains JSON in the format of
-            ``summary.json``. The table may lack this column.
-
-    Returns:
-        Counts, the most frequent warning first. The list is empty if there are no
-        warnings.
+    The column ``warnings`` contains JSON in the format of ``summary.json``. The table
+    may lack this column.
     """
     runs, messages = Counter[str](), dict[str, str]()
     for text in rows.get("warnings", ()):

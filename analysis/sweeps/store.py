@@ -44,18 +44,11 @@ class SweepStore:
     def __init__(
         self, out: Path | None, plan: SweepPlan, points: Sequence[SweepPoint]
     ) -> None:
-        """Opens the directory of a plan's sweep, or creates the directory.
+        """Opens the directory of a sweep, or creates the directory.
 
-        Args:
-            out: Directory of the parameter sweep. None means the next number under
-                results/.
-            plan: Plan of the sweep.
-            points: All runs of the plan, sorted by their number.
-
-        Raises:
-            InputError: The directory contains something else, cannot be written, or is
-                in use. The error is about the field ``out``.
-            StoreError: The disk is full.
+        None means the next number under results/. The points are sorted by their
+        number. Raises InputError if the directory contains something else, cannot be
+        written, or is in use, and StoreError if the disk is full.
         """
         self._journal = -1
         try:
@@ -104,14 +97,7 @@ class SweepStore:
         self._journal = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
 
     def add(self, outcome: Outcome) -> None:
-        """Writes the results of a run to the disk.
-
-        Args:
-            outcome: Results of the run.
-
-        Raises:
-            StoreError: The disk is full or faulty.
-        """
+        """Writes the results of a run; raises StoreError if the disk is full."""
         index = outcome.row["index"]
         line = memoryview((json.dumps(outcome.row, allow_nan=False) + "\n").encode())
         size = os.fstat(self._journal).st_size
@@ -128,11 +114,8 @@ class SweepStore:
     def write_table(self, *, complete: bool) -> None:
         """Writes the table of all finished runs.
 
-        Args:
-            complete: Whether all runs are finished. If so, ``runs.jsonl`` is removed.
-
-        Raises:
-            StoreError: The disk is full or faulty.
+        If all runs are finished, ``runs.jsonl`` is removed. Raises StoreError if the
+        disk is full or faulty.
         """
         if self._journal < 0:
             return
@@ -160,15 +143,8 @@ class SweepStore:
 def load_results(out: str | Path) -> pd.DataFrame:
     """Loads the finished runs of a parameter sweep, even while the sweep is running.
 
-    Args:
-        out: Directory of the sweep.
-
-    Returns:
-        Table with one row per run, sorted by the run's number. ``results_table``
-        describes the columns.
-
-    Raises:
-        InputError: The directory contains no sweep.
+    The table has one row per run, sorted by the run's number; ``results_table``
+    describes the columns. Raises InputError if the directory contains no sweep.
     """
     journal, table = Path(out) / JOURNAL, Path(out) / TABLE
     if journal.exists():
@@ -183,15 +159,7 @@ def load_results(out: str | Path) -> pd.DataFrame:
 
 
 def trajectory_path(out: Path, index: int) -> Path:
-    """Returns the file of a run's trajectory.
-
-    Args:
-        out: Directory of the parameter sweep.
-        index: Number of the run, from 0.
-
-    Returns:
-        Path of a Parquet file in the folder ``trajectories``.
-    """
+    """Returns the file of the trajectory of the run with this number."""
     return out / "trajectories" / f"{index:06d}.parquet"
 
 
@@ -266,14 +234,10 @@ def _check_same(out: Path, plan: SweepPlan) -> None:
 def _runs_of(
     points: Sequence[SweepPoint], lines: Sequence[bytes]
 ) -> tuple[dict[int, bytes], list[int]]:
-    """Sorts the lines of a file into runs of a plan and other lines.
+    """Returns the line of each run of a plan by its number, and numbers of other lines.
 
     If two different lines claim to be the same run, neither is accepted. An unfinished
-    last line, left by a crash, is ignored.
-
-    Returns:
-        A pair. The first is a mapping from the number of each run to its line. The
-        second is a list of the line numbers of all other lines, starting from 1.
+    last line, left by a crash, is ignored. The numbers of lines start from 1.
     """
     found: dict[int, dict[bytes, int]] = {}
     others = []

@@ -45,16 +45,10 @@ class PreparedSweep:
     def run(self, progress: Callable[[int], None] | None = None) -> pd.DataFrame:
         """Does all runs of a parameter sweep that are not in its directory yet.
 
-        Args:
-            progress: Function that is called a few times per second with the number of
-                finished runs. If it raises an exception, the sweep ends.
-
-        Returns:
-            Table with one row per run, as from ``load_results``.
-
-        Raises:
-            StoreError: The disk is full or faulty.
-            WorkerError: Worker processes cannot be started or reached.
+        The function ``progress`` is called a few times per second with the number of
+        finished runs. If it raises an exception, the sweep ends. The table is that of
+        ``load_results``. Raises StoreError if the disk is full or faulty, and
+        WorkerError if worker processes cannot be started or reached.
         """
 
         def pulse() -> None:
@@ -104,19 +98,16 @@ def prepare_sweep(
 ) -> PreparedSweep:
     """Draws and checks all runs of a parameter sweep, then opens its directory.
 
-    Args:
-        plan: Plan of the sweep.
-        out: Directory of the results. None means the next number under results/.
-        workers: Number of local processes. None means one process per processor core.
-        scheduler: Address of a Dask scheduler, which then replaces the local processes.
-        resume: Whether ``out`` may contain runs of the same plan. These runs are kept.
+    The directory is locked until the sweep has run, which it can do once. Raises
+    InputError, which states the fault and the remedy, if an argument or the plan is not
+    valid.
 
-    Returns:
-        The sweep, which can be run once. Its directory is locked until then.
-
-    Raises:
-        InputError: An argument or the plan is not valid. The message states the fault
-            and the remedy.
+    - ``out``: Directory of the results. None means the next number under results/.
+    - ``workers``: Number of local processes. None means one process per processor core.
+    - ``scheduler``: Address of a Dask scheduler, which then replaces the local
+      processes.
+    - ``resume``: Whether ``out`` may contain runs of the same plan. These runs are
+      kept.
     """
     check_options(out, workers=workers, scheduler=scheduler, resume=resume)
     directory = Path(out).expanduser() if out is not None else None
@@ -133,48 +124,10 @@ def prepare_sweep(
     return PreparedSweep(plan, points, store, runner, compiled)
 
 
-def run_sweep(
-    plan: SweepPlan,
-    out: str | Path,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    resume: bool = False,
-    progress: Callable[[int], None] | None = None,
-) -> pd.DataFrame:
-    """Prepares a parameter sweep and does all its runs.
-
-    Args:
-        plan: Plan of the sweep.
-        out: Directory of the results.
-        workers: Number of local processes. None means one process per processor core.
-        scheduler: Address of a Dask scheduler, which then replaces the local processes.
-        resume: Whether ``out`` may contain runs of the same plan. These runs are kept.
-        progress: Function that is called with the number of finished runs.
-
-    Returns:
-        Table with one row per run, as from ``load_results``.
-
-    Raises:
-        InputError: An argument or the plan is not valid. The message states the fault
-            and the remedy.
-    """
-    prepared = prepare_sweep(
-        plan, out, workers=workers, scheduler=scheduler, resume=resume
-    )
-    return prepared.run(progress)
-
-
 def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
-    """Returns the shell command that repeats one run of a parameter sweep.
+    """Returns the shell command that repeats one run of the sweep in a directory.
 
-    Args:
-        out: Directory of the sweep, which contains the scenario file.
-        point: Run to repeat.
-        engine: Engine that did the run: ``drake`` or ``compiled``.
-
-    Returns:
-        Command in one line, with quotes for the shell.
+    The engine is that of the run: ``drake`` or ``compiled``.
     """
     words = ["phonotaxis", "simulate", str(out / "scenario.yaml")]
     for path, value in point.fields.items():
@@ -191,9 +144,9 @@ def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
     The function builds the diagram of the first run. It also builds the diagram of
     every run in which a field has a new text or mapping as its value.
 
-    Returns:
-        Whether to use the compiled engine for scenarios that do not choose an engine.
-        That is the case for many runs, unless numba cannot compile code of the user.
+    It returns whether to use the compiled engine for scenarios that do not choose an
+    engine. That is the case for many runs, unless numba cannot compile code of the
+    user.
     """
     compiled = len(points) >= MANY_RUNS
     seen: set[str] = set()

@@ -12,17 +12,10 @@ SWEEP_SCHEMA_FILE = Path(__file__).with_name("sweep.schema.json")
 
 
 def read_sweep(path: str | Path) -> dict[str, Any]:
-    """Reads the fields of a parameter sweep without checking them.
+    """Reads the fields of a parameter sweep from a YAML file without checking them.
 
-    Args:
-        path: YAML file with the fields of ``SweepPlan``. Relative paths in the file
-            start in its folder.
-
-    Returns:
-        Plain values of the fields, and the folder of the file as ``folder``.
-
-    Raises:
-        InputError: The file cannot be read.
+    The result also has the folder of the file as ``folder``. Raises InputError if the
+    file cannot be read.
     """
     path = require_file(path, "sweep", "YAML")
     data = read_mapping(path)

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reporting.html_page import (
-    definitions,
-    file_links,
-    heading,
-    note,
-    paragraph,
-    picture,
-    section,
-    table,
-)
 from analysis.reporting.plain_values import write_json
-from analysis.reporting.render import page
+from analysis.reporting.render import heading, html, page
+from analysis.reporting.section import (
+    Content,
+    Definitions,
+    Files,
+    Note,
+    Picture,
+    Section,
+    Table,
+)
 from analysis.runs.metric_table import METRICS
 from analysis.runs.proximity import Proximity
 from analysis.runs.run_report import summary_rows
@@ -95,17 +94,19 @@ def _page(
     def there(name: str) -> bool:
         return (directory / name).is_file()
 
-    parts = {"Summary": _summary(result, rows, has_replay=there("replay.html"))}
+    parts: dict[str, Sequence[Content]] = {
+        "Summary": _summary(result, rows, has_replay=there("replay.html"))
+    }
     if there("trajectory.png"):
         caption = "The run from above, in W. Times are in seconds."
-        parts["From above"] = [picture("trajectory.png", caption)]
+        parts["From above"] = [Picture("trajectory.png", caption)]
     whose = {f"_{name}": f": {name}" for name in result.several} or {"": ""}
     for title, file, text, owners in (
         ("Over time", "time_series{}.png", "Sensors and commands over time", whose),
         ("Blocks", "diagram{}.svg", "Blocks and their connections", {"": "", **whose}),
     ):
         shown = [
-            picture(file.format(ending), f"{text}{who}.")
+            Picture(file.format(ending), f"{text}{who}.")
             for ending, who in owners.items()
             if there(file.format(ending))
         ]
@@ -113,9 +114,12 @@ def _page(
             parts[title] = shown
     parts["Figures"] = _figures(result, summary)
     files = [(name, text) for name, text in _FILES.items() if there(name)]
-    parts["Files"] = [file_links(files)]
+    parts["Files"] = [Files(files)]
     contents = [(_anchor(title), title) for title in parts]
-    sections = [section(_anchor(title), title, inner) for title, inner in parts.items()]
+    sections = [
+        html(Section(_anchor(title), title, inner), _anchor(title))
+        for title, inner in parts.items()
+    ]
     return page(run_title(result), contents, sections)
 
 
@@ -125,16 +129,18 @@ def _anchor(title: str) -> str:
 
 def _summary(
     result: RunResult, rows: Mapping[str, str], *, has_replay: bool
-) -> list[str]:
+) -> list[Content]:
     """Returns the warnings and the summary, with a list of rows per robot."""
     begin = 0
-    parts = [note(f"Warning: `{x.field}`: {x.message}") for x in result.warnings]
+    parts: list[Content] = [
+        Note(f"Warning: `{x.field}`: {x.message}") for x in result.warnings
+    ]
     names = list(rows)
     starts = [names.index(name) for name in result.several]
     for end in [*starts, len(names)]:
         own = names[begin:end]
         if begin in starts:
-            parts.append(heading(3, own[0]))
+            parts.append(heading(own[0]))
         shown = [
             (
                 "Ended" if name in result.several else name.split(".")[-1].capitalize(),
@@ -142,7 +148,7 @@ def _summary(
             )
             for name in own
         ]
-        parts.append(definitions(shown))
+        parts.append(Definitions(shown))
         begin = end
     if has_replay:
         watch = [("replay.html", "the whole run as an animation")]
@@ -151,11 +157,11 @@ def _summary(
             watch.append(
                 (f"replay.html#t={moment:.2f}", "one second before the collision")
             )
-        parts.append(file_links(watch))
+        parts.append(Files(watch))
     return parts
 
 
-def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
+def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[Content]:
     """Returns a table with one row per metric and one column per robot."""
     metrics: Mapping[str, Any] = summary["metrics"]
     prefixes = [f"{name}." for name in result.several] or [""]
@@ -165,8 +171,11 @@ def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
         if any(f"{prefix}{metric.name}" in metrics for prefix in prefixes)
     ]
     rows = [
-        [metric.label, *(metrics.get(f"{prefix}{metric.name}") for prefix in prefixes)]
+        [
+            metric.label,
+            *(metrics.get(f"{prefix}{metric.name}") for prefix in prefixes),
+        ]
         for metric in found
     ]
     text = "docs/metrics.md defines each metric."
-    return [paragraph(text), table(["", *(result.several or [""])], rows)]
+    return [text, Table(["", *(result.several or [""])], rows)]

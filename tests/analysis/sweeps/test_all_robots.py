@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.sweeps.batch import summarise
+from analysis.sweeps.batch import summarize
 from analysis.sweeps.comparison_plans import comparison_plan
 from analysis.sweeps.one_run import Task, results_table, run_task
 from analysis.sweeps.run_rows import with_all_robots
@@ -45,7 +45,7 @@ def test_two_robots_are_compared():
         for point in plan.points()
     ]
     table = results_table(run_task(task).row for task in tasks)
-    comparison = summarise(plan, table, "robots_2")
+    comparison = summarize(plan, table, "robots_2")
     _, filtered = comparison.cells
     assert filtered.causes == {"reached": 3}
     each = [f"{name}.minimum_obstacle_clearance_m" for name in ("first", "second")]

@@ -20,7 +20,7 @@ from analysis.sweeps.one_run import Task, results_table, run_task
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.processes import WorkerError
 from analysis.sweeps.store import load_results
-from analysis.sweeps.sweep import run_sweep
+from analysis.sweeps.sweep import prepare_sweep
 
 distributed = pytest.importorskip("distributed")
 
@@ -51,9 +51,8 @@ def test_a_lost_worker_changes_nothing(cluster, tmp_path):
             lost.append(alive[0])
             os.kill(alive[0], signal.SIGKILL)
 
-    table = run_sweep(
-        plan, tmp_path / "out", scheduler=cluster.scheduler_address, progress=lose_one
-    )
+    sweep = prepare_sweep(plan, tmp_path / "out", scheduler=cluster.scheduler_address)
+    table = sweep.run(lose_one)
     assert lost
     expected = results_table(
         run_task(Task(point, plan.scenario_of(point), "drake", trajectory=False)).row
@@ -122,7 +121,7 @@ def killed(
 
     plan = SweepPlan.model_validate(PLAN)
     with pytest.raises(WorkerError) as caught:
-        run_sweep(plan, out, scheduler=cluster.address, progress=lose)
+        prepare_sweep(plan, out, scheduler=cluster.address).run(lose)
     assert process.poll() is not None
     return caught.value
 
@@ -171,8 +170,7 @@ def test_a_new_worker_takes_over(mortal, tmp_path, monkeypatch, caplog):
             started.append(mortal.start_worker().pid)
 
     plan = SweepPlan.model_validate(PLAN | {"runs": 12})
-    table = run_sweep(
-        plan, tmp_path / "out", scheduler=mortal.address, progress=replace
-    )
+    sweep = prepare_sweep(plan, tmp_path / "out", scheduler=mortal.address)
+    table = sweep.run(replace)
     assert len(started) == 1
     assert list(table["cause"]) == ["completed"] * 12

@@ -9,7 +9,7 @@ import pytest
 
 import analysis.sweeps.sweep as sweeps
 from analysis.sweeps.plan import SweepPlan
-from analysis.sweeps.sweep import run_sweep
+from analysis.sweeps.sweep import prepare_sweep
 
 LAWS = """
 def wordy(c, s, laws):
@@ -32,7 +32,7 @@ def swept(out, runs, law, **fields):
         grid={"law": law},
         runs=runs,
     )
-    return run_sweep(plan, out, workers=1)
+    return prepare_sweep(plan, out, workers=1).run()
 
 
 @pytest.mark.slow

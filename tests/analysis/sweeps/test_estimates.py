@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.sweeps.batch import Batch, summarise
+from analysis.sweeps.batch import Batch, summarize
 from analysis.sweeps.cells import Quantity, cell_label, marginal
 from analysis.sweeps.page import batch_page
 from analysis.sweeps.plan import SweepPlan
@@ -68,7 +68,7 @@ def made_up(**changes):
 def batch(plan, points, table, out) -> Batch:
     """A batch whose runs are done."""
     done: Any = SimpleNamespace(points=points, store=SimpleNamespace(out=out))
-    summary = summarise(plan, table.assign(warnings="[]"), "default")
+    summary = summarize(plan, table.assign(warnings="[]"), "default")
     return Batch("Sweep", out, {"default": done}, {"default": summary}, [])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.sweeps.batch import Summary, summarise
+from analysis.sweeps.batch import Summary, summarize
 from analysis.sweeps.pairs import pooled_pairs
 from analysis.sweeps.plan import SweepPlan
 
@@ -54,7 +54,7 @@ def table() -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def comparison() -> Summary:
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
-    return summarise(plan, table(), "here")
+    return summarize(plan, table(), "here")
 
 
 def test_rates_of_each_law(comparison):
@@ -118,7 +118,7 @@ def test_examples_are_ordered_by_success_then_by_clearance(comparison):
 def test_pooled_pairs_are_those_of_all_experiments():
     """The same table twice: counts double, rates and medians stay."""
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
-    (once,) = summarise(plan, table(), "here").pairs
+    (once,) = summarize(plan, table(), "here").pairs
     (twice,) = pooled_pairs([(plan, table()), (plan, table())])
     assert twice.success.difference.n == 2 * once.success.difference.n
     assert twice.success.only_second == 2 * once.success.only_second
@@ -130,7 +130,7 @@ def test_pooled_pairs_are_those_of_all_experiments():
 
 def test_one_experiment_pooled_is_itself():
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
-    pairs = summarise(plan, table(), "here").pairs
+    pairs = summarize(plan, table(), "here").pairs
     expected = [replace(pair, scenario="all", fields={}) for pair in pairs]
     assert pooled_pairs([(plan, table())]) == expected
 
@@ -147,7 +147,7 @@ def test_pairs_differ_in_one_field_alone():
             "collision_fault": None,
         }
     )
-    pairs = summarise(plan, rows, "here").pairs
+    pairs = summarize(plan, rows, "here").pairs
     assert [(p.field, p.first, p.second, p.fields) for p in pairs] == [
         ("hearing", "audio", "ideal", {"law": "none"}),
         ("law", "none", "active", {"hearing": "audio"}),
@@ -202,7 +202,7 @@ def test_mechanisms_go_by_the_tick_of_the_runs(plan, swept, out_of_sight):
         **swept,
     )
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5, **plan)
-    for cell in summarise(plan, rows, "here").cells:
+    for cell in summarize(plan, rows, "here").cells:
         assert cell.mechanisms.get("out of sight", 0) == out_of_sight
 
 
@@ -215,7 +215,7 @@ def test_encounters_are_of_layouts_on_which_both_pushed():
         for run, cell in zip(rows["run"], rows["cell"], strict=True)
     ]
     plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
-    (pair,) = summarise(plan, rows, "here").pairs
+    (pair,) = summarize(plan, rows, "here").pairs
     assert pair.metrics["jerk_rms_m_s3"].difference.n == 3
     assert pair.encounters["jerk_rms_m_s3"].difference.n == 1
     assert pair.encounters["jerk_rms_m_s3"].first == 1.0 + 3

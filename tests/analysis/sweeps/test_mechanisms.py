@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from analysis.runs.metric_table import run_metrics
-from analysis.sweeps.mechanisms import failure_mechanisms
+from analysis.sweeps.cells import failure_mechanisms
 from diagrams import load_scenario, simulate
 
 KINDS = [

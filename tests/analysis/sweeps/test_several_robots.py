@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.sweeps.batch import summarise
+from analysis.sweeps.batch import summarize
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.report import robot_rows
-from analysis.sweeps.sweep import run_sweep
+from analysis.sweeps.sweep import prepare_sweep
 from diagrams import load_scenario, simulate
 
 
@@ -29,14 +29,14 @@ def test_rows_and_pages_have_each_robots_own(tmp_path):
         },
     }
     plan = SweepPlan.model_validate({"scenario": "two_followers", "set": settings})
-    table = run_sweep(plan, tmp_path / "out", workers=1)
+    table = prepare_sweep(plan, tmp_path / "out", workers=1).run()
     row = table.iloc[0]
     assert row["cause"] == row["near.cause"] == row["far.cause"] == "collision"
     assert (row["near.collision_object"], row["far.collision_object"]) == (
         "far",
         "near",
     )
-    head, near, far = robot_rows(summarise(plan, table, "two_followers"))
+    head, near, far = robot_rows(summarize(plan, table, "two_followers"))
     assert (near[1], far[1]) == ("near", "far")
     assert head[2:4] == ["least clearance (m)", "least clearance from obstacles (m)"]
     assert near[2] == far[2], "each touches the other"

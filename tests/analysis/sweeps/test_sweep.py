@@ -20,7 +20,7 @@ from analysis.sweeps.one_run import Outcome, Task, run_task
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.processes import WorkerError, WorkerProcess
 from analysis.sweeps.store import StoreError, load_results
-from analysis.sweeps.sweep import PreparedSweep, prepare_sweep, run_sweep
+from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 from diagrams import simulate
 from systems.framework.input_error import InputError
 
@@ -118,7 +118,7 @@ def test_row_is_what_the_scenario_gives(undisturbed):
 
 def test_processes_give_the_same_rows(undisturbed, tmp_path):
     seen: list[int] = []
-    table = run_sweep(plan(), tmp_path / "out", workers=2, progress=seen.append)
+    table = prepare_sweep(plan(), tmp_path / "out", workers=2).run(seen.append)
     pd.testing.assert_frame_equal(without_times(table), without_times(undisturbed))
     assert seen[0] == 0
     assert seen[-1] == 12
@@ -291,9 +291,10 @@ def test_a_run_that_fails_is_recorded_and_the_rest_goes_on(tmp_path, laws):
 @pytest.mark.slow
 def test_a_run_that_kills_its_process_is_recorded(tmp_path, laws):
     laws_used = ["sweep_laws:deadly", "sweep_laws:mortal", "active"]
-    table = run_sweep(
+    sweep = prepare_sweep(
         plan(grid={"law": laws_used}, runs=1), tmp_path / "out", workers=2
     )
+    table = sweep.run()
     assert list(table["cause"]) == ["failed", "completed", "completed"]
     assert "ended 2 times" in table["error"][0]
     assert (laws / "died").exists()
