@@ -166,6 +166,9 @@ def prepare_stability(
         scenarios: Scenario of one robot, with each law.
         note: Note that names the robots that are left out; empty if there are none.
         full: Whether to check by longer simulations, and by more of them.
+
+    Returns:
+        The work, which returns the report.
     """
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)

@@ -265,6 +265,9 @@ def prepare_simulation(
         audio: Open files for the sound; None means those of ``saved``.
         saved: Directory for the sound of the run.
         movie: Movie of the run.
+
+    Returns:
+        The work, which returns the result of the run.
     """
     check_files(scenario)
     for warning in warnings_of(scenario):
