@@ -12,7 +12,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.hearing.single_frames import Loudspeaker
+from analysis.arrays.single_frames import Loudspeaker
 from studies.support.figures import Figure, print_figures, stay_on_one_core
 from systems.base.robot import RobotParameters
 from systems.framework.signals import FRAME_SAMPLES

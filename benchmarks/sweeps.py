@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.sweeps.one_run import Task, run_task
-from analysis.sweeps.plan import SweepPlan
-from analysis.sweeps.sweep import prepare_sweep
+from analysis.batches.one_run import Task, run_task
+from analysis.batches.plan import SweepPlan
+from analysis.batches.sweep import prepare_sweep
 from benchmarks.process_tree import tree_usage
 from diagrams import simulate
 from diagrams.scenario.run_parameters import Engine

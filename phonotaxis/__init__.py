@@ -13,12 +13,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from analysis.arrays.array_geometry import ArrayGeometry
+    from analysis.arrays.locate_result import SourceEstimate
     from analysis.arrays.voting.source_listener_block import SourceListener
-    from analysis.recordings.array_geometry import ArrayGeometry
-    from analysis.recordings.locate_result import SourceEstimate
+    from analysis.batches.plan import SweepPlan
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
-    from analysis.sweeps.plan import SweepPlan
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
@@ -71,7 +71,7 @@ __version__: str
 
 #: Module of each public name. Type checkers use the imports above instead.
 _HOMES = {
-    "ArrayGeometry": "analysis.recordings.array_geometry",
+    "ArrayGeometry": "analysis.arrays.array_geometry",
     "CalibrationResult": "phonotaxis.recordings",
     "ComparisonResult": "phonotaxis.batches",
     "DesignResult": "phonotaxis.loops",
@@ -82,10 +82,10 @@ _HOMES = {
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
-    "SourceEstimate": "analysis.recordings.locate_result",
+    "SourceEstimate": "analysis.arrays.locate_result",
     "SourceListener": "analysis.arrays.voting.source_listener_block",
     "StabilityResult": "phonotaxis.loops",
-    "SweepPlan": "analysis.sweeps.plan",
+    "SweepPlan": "analysis.batches.plan",
     "SweepResult": "phonotaxis.batches",
     "calibrate": "phonotaxis.recordings",
     "columns": "analysis.runs.columns",

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from analysis.reporting.result_directory import whole_directory
-from analysis.sweeps.batch import (
+from analysis.batches.batch import (
     Batch,
     PreparedBatch,
     Summary,
     prepare_batch,
     prepare_comparison,
 )
-from analysis.sweeps.comparison_plans import EXPERIMENTS, comparison_plan
-from analysis.sweeps.page import write_batch
-from analysis.sweeps.plan import SweepPlan, load_sweep
-from analysis.sweeps.plots import plot_cells
-from analysis.sweeps.report import batch_document, batch_text, warning_lines
+from analysis.batches.comparison_plans import EXPERIMENTS, comparison_plan
+from analysis.batches.page import write_batch
+from analysis.batches.plan import SweepPlan, load_sweep
+from analysis.batches.plots import plot_cells
+from analysis.batches.report import batch_document, batch_text, warning_lines
+from analysis.report.result_directory import whole_directory
 from phonotaxis.result import Prepared, Result, ignore
 from systems.framework.input_error import InputError
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from analysis.sweeps.pairs import Pair
+    from analysis.batches.pairs import Pair
 
 __all__ = ["ComparisonResult", "SweepResult", "compare", "sweep"]
 

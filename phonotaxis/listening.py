@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from analysis.listening.live_hearing import HeardStep, HeardStream
-    from analysis.listening.sound_pipe import SampleFormat
-    from analysis.listening.sound_stream import SoundStream
-    from analysis.recordings.array_geometry import ArrayGeometry
+    from analysis.arrays.array_geometry import ArrayGeometry
+    from analysis.arrays.live_hearing import HeardStep, HeardStream
+    from analysis.arrays.sound_pipe import SampleFormat
+    from analysis.arrays.sound_stream import SoundStream
 
 __all__ = ["ListenResult", "listen"]
 
@@ -70,7 +70,7 @@ class ListenResult(Result):
 
     def plot(self) -> Figure:
         """Draws the bearings of all sources over time."""
-        from analysis.listening.track_plots import plot_tracks
+        from analysis.arrays.track_plots import plot_tracks
 
         return plot_tracks(self.table)
 
@@ -81,7 +81,7 @@ class ListenResult(Result):
             document: The JSON document, with the key ``out``.
             directory: Existing directory.
         """
-        from analysis.reporting.plain_values import write_json
+        from analysis.report.plain_values import write_json
 
         write_json(document, directory / "listen.json")
         self.table.to_csv(directory / "tracks.csv", index=False)
@@ -152,7 +152,7 @@ def track_sources(
     fault: Callable[[str, float], None] | None = None,
 ) -> ListenResult:
     """Tracks the sources in an open stream; see ``listen``."""
-    from analysis.listening.live_hearing import LiveHearing, listen_to, track_document
+    from analysis.arrays.live_hearing import LiveHearing, listen_to, track_document
 
     rows: deque[dict[str, Any]] = deque(maxlen=_MOST_ROWS)
 
@@ -184,9 +184,9 @@ def open_sound(
     sample_format: SampleFormat,
 ) -> tuple[SoundStream, ArrayGeometry]:
     """Opens a stream of sound, and loads the geometry of its array; see ``listen``."""
-    from analysis.listening.sound_card import open_card
-    from analysis.listening.sound_pipe import open_flac, open_pipe
-    from analysis.recordings.array_geometry import make_geometry
+    from analysis.arrays.array_geometry import make_geometry
+    from analysis.arrays.sound_card import open_card
+    from analysis.arrays.sound_pipe import open_flac, open_pipe
     from systems.framework.input_error import InputError
 
     known = make_geometry(geometry)

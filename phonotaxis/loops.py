@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.design.design_plots import plot_design
-from analysis.design.design_study import STUDY_RUNS, DesignStudy, study_design
-from analysis.design.design_text import design_document, design_text, write_design
 from analysis.run_error import RunError
 from analysis.stability import report_parts
 from analysis.stability.choice import chosen_laws, chosen_robot
+from analysis.stability.design_plots import plot_design
+from analysis.stability.design_study import STUDY_RUNS, DesignStudy, study_design
+from analysis.stability.design_text import design_document, design_text, write_design
 from analysis.stability.law_analysis import LawAnalysis, analyse_law
 from analysis.stability.report_files import (
     report_figures,

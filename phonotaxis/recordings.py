@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from numpy.typing import ArrayLike
 
-from analysis.calibration.calibrate import CalibrationRun, calibrate as run_calibration
-from analysis.calibration.calibration_plots import plot_calibration
-from analysis.calibration.calibration_sounds import (
+from analysis.arrays.array_geometry import ArrayGeometry, make_geometry
+from analysis.arrays.calibrate import CalibrationRun, calibrate as run_calibration
+from analysis.arrays.calibration_plots import plot_calibration
+from analysis.arrays.calibration_sounds import (
     CalibrationSounds,
     load_calibration_sounds,
 )
-from analysis.calibration.calibration_text import (
+from analysis.arrays.calibration_text import (
     calibration_document,
     calibration_text,
     write_calibration,
 )
-from analysis.recordings.array_geometry import ArrayGeometry, make_geometry
-from analysis.recordings.locate import located
-from analysis.recordings.locate_plots import plot_locate, write_locate
-from analysis.recordings.locate_result import LocatedSource
-from analysis.recordings.locate_text import locate_text
-from analysis.recordings.prepared_recording import RecordedSamples, recorded_samples
+from analysis.arrays.locate import located
+from analysis.arrays.locate_plots import plot_locate, write_locate
+from analysis.arrays.locate_result import LocatedSource
+from analysis.arrays.locate_text import locate_text
+from analysis.arrays.prepared_recording import RecordedSamples, recorded_samples
 from phonotaxis.result import Prepared, Result, ignore
 
 if TYPE_CHECKING:

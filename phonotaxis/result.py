@@ -76,7 +76,7 @@ class Result(Output):
         Raises:
             InputError: The directory is in use, or cannot be created or written.
         """
-        from analysis.reporting.result_directory import whole_directory
+        from analysis.report.result_directory import whole_directory
 
         with whole_directory(directory) as (shown, partial):
             self.write({**self.document(), "out": str(shown)}, partial)

@@ -31,7 +31,7 @@ class SavedAudio:
     """
 
     def __init__(self, directory: str | Path, scenario: Scenario) -> None:
-        from analysis.reporting.result_directory import check_directory
+        from analysis.report.result_directory import check_directory
         from diagrams.scenario.audible import check_audible
 
         check_audible(scenario)
@@ -50,7 +50,7 @@ class SavedAudio:
         Raises:
             InputError: Another process took the directory after this object was made.
         """
-        from analysis.reporting.result_directory import take_directory
+        from analysis.report.result_directory import take_directory
         from diagrams import RunAudio
 
         with _naming_option():

@@ -22,9 +22,9 @@ from pathlib import Path
 from shlex import join
 from typing import Any
 
-from analysis.reporting.markdown import markdown_head, markdown_row
-from analysis.reporting.plain_values import plain, write_json
-from analysis.reporting.provenance import versions
+from analysis.report.markdown import markdown_head, markdown_row
+from analysis.report.plain_values import plain, write_json
+from analysis.report.provenance import versions
 from studies.tables import MissedBoundError, Table
 from systems.framework.input_error import InputError
 

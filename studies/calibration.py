@@ -21,9 +21,9 @@ import soundfile
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from analysis.calibration.calibrate import CalibrationRun, calibrate, calibration_run
-from analysis.calibration.calibration_sounds import CalibrationSounds, MeasuredSound
-from analysis.recordings.array_geometry import ArrayGeometry
+from analysis.arrays.array_geometry import ArrayGeometry
+from analysis.arrays.calibrate import CalibrationRun, calibrate, calibration_run
+from analysis.arrays.calibration_sounds import CalibrationSounds, MeasuredSound
 from studies.tables import Table
 
 C, SPEED_STD, PLACE_STD, LATE_STD = 340.0, 3.4, 0.02, 1e-6

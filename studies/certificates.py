@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.certificates.certificate_trials import CertificateTrials, try_certificate
-from analysis.certificates.energy_certificate import certify_energy
+from analysis.energy.certificate_trials import CertificateTrials, try_certificate
+from analysis.energy.energy_certificate import certify_energy
 from diagrams import load_scenario
 from studies.proofs.diagram_trials import DiagramTrials, try_diagram
 from studies.proofs.sos_region import SosRegion, sos_region
@@ -202,7 +202,7 @@ def run(options: argparse.Namespace) -> Iterator[Table]:
 
 def _draw(rows: Sequence[CertificateRow], directory: Path) -> None:
     """Map, phase plane and region of each law."""
-    from analysis.certificates.certificate_plots import plot_energy_certificate
+    from analysis.energy.certificate_plots import plot_energy_certificate
     from studies.nonlinear.phase_portrait import phase_portrait
     from studies.nonlinear.plots import plot_phase_portrait
     from studies.proofs.plots import plot_sos_region

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.sweeps.comparison_plans import comparison_plan, library_layouts
+from analysis.batches.comparison_plans import comparison_plan, library_layouts
 from diagrams import RunResult, simulate
 from studies.tables import MissedBoundError, Table
 from systems.laws.catalogue import LAWS

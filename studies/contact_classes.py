@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.sweeps.plan import SweepPlan, load_sweep
-from analysis.sweeps.store import load_results
+from analysis.batches.plan import SweepPlan, load_sweep
+from analysis.batches.store import load_results
 from diagrams import simulate
 from studies.tables import Table
 from systems.world.geometry import nearest_point_on_rectangle, rotate

@@ -9,7 +9,7 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from analysis.hearing.single_frames import Loudspeaker
+from analysis.arrays.single_frames import Loudspeaker
 from studies.support.detection import (
     DetectionPoint,
     FalseAlarms,

@@ -13,8 +13,8 @@ from time import perf_counter
 
 import numpy as np
 
-from analysis.hearing.paper_tables import PAPER_CELLS
-from analysis.hearing.single_frames import Estimator, Loudspeaker, frame_estimator
+from analysis.arrays.paper_tables import PAPER_CELLS
+from analysis.arrays.single_frames import Estimator, Loudspeaker, frame_estimator
 from studies.support.free_field_trials import FreeFieldCell, run_cell, total_consistency
 from studies.tables import Table
 from systems.base.robot import RobotParameters

@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Wedge
 
-from analysis.reporting.palette import COLOURS, SERIES_COLOURS, draw_grid
+from analysis.report.palette import COLOURS, SERIES_COLOURS, draw_grid
 from analysis.safety.driver_trials import TWIST, make_trial, run_result
 from diagrams import RunResult, Scenario
 from diagrams.scenario.warnings.guarantees import clear_way, seen_angle_deg

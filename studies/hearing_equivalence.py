@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from analysis.reporting.intervals import Estimate
+from analysis.report.intervals import Estimate
 from studies.tables import Table
 
 #: Bounds within which both count as equivalent.

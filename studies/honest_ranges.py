@@ -18,11 +18,11 @@ from multiprocessing import Pool
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.recordings.locate import hear
-from analysis.recordings.locate_result import LocatedSource
-from analysis.recordings.prepared_recording import RecordedSamples
-from analysis.recordings.recording_search import MAD_TO_STD
-from analysis.reporting.intervals import estimate_rate
+from analysis.arrays.locate import hear
+from analysis.arrays.locate_result import LocatedSource
+from analysis.arrays.prepared_recording import RecordedSamples
+from analysis.arrays.recording_search import MAD_TO_STD
+from analysis.report.intervals import estimate_rate
 from studies.support.drawn_recordings import (
     RATE,
     SHORT_COUNT,

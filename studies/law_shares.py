@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.reporting.intervals import estimate_rate
-from analysis.sweeps.store import load_results
+from analysis.batches.store import load_results
+from analysis.report.intervals import estimate_rate
 from diagrams.running.stop_rules import SUCCESSFUL
 from studies.tables import Table
 

@@ -11,12 +11,12 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from analysis.certificates.velocity_passivity import (
+from analysis.energy.velocity_passivity import (
     energy_balance,
     velocity_term_passivity,
 )
-from analysis.laws.radial_law import radial_law
-from analysis.models.point_mass import point_mass
+from analysis.loops.point_mass import point_mass
+from analysis.loops.radial_law import radial_law
 from diagrams import Scenario, load_scenario
 from studies.nonlinear.contact_oscillation import contact_oscillation
 from studies.nonlinear.equilibrium_maps import gap_map, offset_map

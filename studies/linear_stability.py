@@ -10,16 +10,16 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from analysis.linear.burst_cycle import HOLDS, burst_cycle, simulate_burst_cycle
-from analysis.linear.contact_mode import contact_limits
-from analysis.linear.delay_margin import DELAY_PLACES, DelayedLoop
-from analysis.linear.delayed_run import check_delay_margin
-from analysis.linear.loop_margins import LoopMargins, all_margins, loop_margins
-from analysis.linear.step_response import check_step
-from analysis.models.equilibria import find_equilibria, follow_equilibrium
-from analysis.models.linearisation import check_gradient, compare_routes
-from analysis.models.open_loops import DIRECTIONS, BreakPoint, target_loop
-from analysis.models.operating_points import OperatingPoint, moving_equilibrium
+from analysis.loops.burst_cycle import HOLDS, burst_cycle, simulate_burst_cycle
+from analysis.loops.contact_mode import contact_limits
+from analysis.loops.delay_margin import DELAY_PLACES, DelayedLoop
+from analysis.loops.delayed_run import check_delay_margin
+from analysis.loops.equilibria import find_equilibria, follow_equilibrium
+from analysis.loops.linearisation import check_gradient, compare_routes
+from analysis.loops.loop_margins import LoopMargins, all_margins, loop_margins
+from analysis.loops.open_loops import DIRECTIONS, BreakPoint, target_loop
+from analysis.loops.operating_points import OperatingPoint, moving_equilibrium
+from analysis.loops.step_response import check_step
 from diagrams import load_scenario
 from diagrams.scenario.scenario import Scenario
 from studies.linear.burst_gaps import gap_chart
@@ -292,7 +292,7 @@ def tables(duration_s: float = 300.0) -> Iterator[Table]:
 
 def draw(directory: Path) -> None:
     """The page's pictures."""
-    from analysis.linear.linear_plots import (
+    from analysis.loops.linear_plots import (
         plot_contact_limits,
         plot_equilibria,
         plot_nyquist,

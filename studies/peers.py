@@ -18,9 +18,9 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.hearing.cramer_rao import LocalizationBound, position_bound
-from analysis.hearing.paper_tables import PAPER_CELLS
-from analysis.hearing.single_frames import Loudspeaker
+from analysis.arrays.cramer_rao import LocalizationBound, position_bound
+from analysis.arrays.paper_tables import PAPER_CELLS
+from analysis.arrays.single_frames import Loudspeaker
 from studies.support.figures import stay_on_one_core
 from studies.support.peer_estimators import SHAPE, C, Frame, estimators
 from studies.tables import Table

@@ -11,9 +11,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from analysis.reporting.intervals import estimate_rate
-from analysis.sweeps.comparison_plans import library_layouts
-from analysis.sweeps.plan import load_sweep
+from analysis.batches.comparison_plans import library_layouts
+from analysis.batches.plan import load_sweep
+from analysis.report.intervals import estimate_rate
 from diagrams import simulate
 from studies.tables import Table
 from systems.laws.catalogue import ROUTE_LAWS

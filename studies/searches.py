@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.reporting.intervals import Estimate, estimate_rate
+from analysis.batches.comparison_plans import library_layouts
+from analysis.report.intervals import Estimate, estimate_rate
 from analysis.runs.metric_table import ARMS_M
-from analysis.sweeps.comparison_plans import library_layouts
 from studies.support.bearing_trials import FAN_M, BearingTrial, hear_once
 from studies.support.listening_methods import (
     PlaneEstimator,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from analysis.reporting.markdown import markdown_table
+from analysis.report.markdown import markdown_table
 
 
 @dataclass(frozen=True)

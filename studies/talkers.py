@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.heard_sources import HeardSources, heard_sources
 from analysis.arrays.voting.direction_votes import VotePlan
 from analysis.arrays.voting.source_listener import (
     ListenerMemory,
@@ -27,7 +28,6 @@ from analysis.arrays.voting.source_listener import (
     TrackedSources,
     hear_sources,
 )
-from analysis.recordings.heard_sources import HeardSources, heard_sources
 from studies.support.figures import Figure, bounds_table
 from studies.support.synthetic_speech import speech_like
 from studies.support.talker_peers import (

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from analysis.reporting.intervals import (
+from analysis.batches.comparison_plans import library_layouts
+from analysis.batches.pairs import paired_median, paired_rate
+from analysis.batches.plan import load_sweep
+from analysis.report.intervals import (
     estimate_median,
     estimate_rate,
 )
 from analysis.runs.metric_table import run_metrics
-from analysis.sweeps.comparison_plans import library_layouts
-from analysis.sweeps.pairs import paired_median, paired_rate
-from analysis.sweeps.plan import load_sweep
 from diagrams import Scenario, simulate
 from studies.tables import Table
 from systems.framework.input_error import InputError

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from scipy.stats import qmc
 
-from analysis.sweeps.comparison_plans import comparison_plan
+from analysis.batches.comparison_plans import comparison_plan
 from diagrams import simulate
 from studies.tables import Table
 

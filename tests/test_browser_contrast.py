@@ -15,8 +15,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
-from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
-from analysis.reporting.render import COLOURS_CSS
+from analysis.report.palette import COLOURS, ROBOT_COLOURS
+from analysis.report.render import COLOURS_CSS
 from analysis.views.replay import write_replay
 from diagrams import load_scenario, simulate
 

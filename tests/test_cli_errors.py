@@ -62,7 +62,7 @@ def fail(*_args, **_options):
         (["design"], "phonotaxis.loops.study_design"),
         (["simulate", *SHORT], "diagrams.simulate"),
         (["stability"], "phonotaxis.loops.analyse_law"),
-        (["accuracy"], "analysis.hearing.localization.prepare_localization"),
+        (["accuracy"], "analysis.arrays.localization.prepare_localization"),
         (["locate", "heard.wav"], "phonotaxis.recordings.located"),
         (["scenarios"], "diagrams.library_scenarios"),
         (["compare", "wall"], "phonotaxis.batches.prepare_comparison"),

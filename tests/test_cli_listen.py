@@ -15,7 +15,7 @@ import pytest
 import soundfile
 
 import phonotaxis
-from tests.analysis.listening.plane_waves import RATE, SQUARE, plane_waves, wav_bytes
+from tests.analysis.arrays.plane_waves import RATE, SQUARE, plane_waves, wav_bytes
 
 ROOT = Path(phonotaxis.__file__).parent
 

@@ -7,8 +7,8 @@ import json
 import pytest
 
 import phonotaxis
-from analysis.reporting.criterion import Criterion
-from analysis.reporting.section import Figure
+from analysis.report.criterion import Criterion
+from analysis.report.section import Figure
 from analysis.stability import report_parts
 from analysis.stability.law_analysis import Part
 from diagrams import load_scenario

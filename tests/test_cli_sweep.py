@@ -16,9 +16,9 @@ import pandas as pd
 import pytest
 
 import phonotaxis
-from analysis.sweeps.one_run import Task, results_table, run_task
-from analysis.sweeps.plan import load_sweep
-from analysis.sweeps.store import load_results
+from analysis.batches.one_run import Task, results_table, run_task
+from analysis.batches.plan import load_sweep
+from analysis.batches.store import load_results
 
 ROOT = Path(phonotaxis.__file__).parents[1]
 SWEEP = """

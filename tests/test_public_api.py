@@ -24,7 +24,7 @@ from ruamel.yaml import YAML
 import diagrams
 import phonotaxis
 from analysis.stability import report_parts
-from tests.analysis.listening.plane_waves import RATE, SQUARE, plane_waves
+from tests.analysis.arrays.plane_waves import RATE, SQUARE, plane_waves
 
 ROOT = Path(__file__).resolve().parents[1]
 IMPORT = """

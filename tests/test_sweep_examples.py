@@ -11,7 +11,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import phonotaxis
-from analysis.sweeps.plan import load_sweep
+from analysis.batches.plan import load_sweep
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "compare.md").read_text("utf-8")

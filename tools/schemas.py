@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from analysis.sweeps.sweep_file import SWEEP_SCHEMA_FILE
+from analysis.batches.sweep_file import SWEEP_SCHEMA_FILE
 from diagrams.scenario.fields.shipped import SCHEMA_FILE
 from tools.scenario_schema import make_schema, schema_file_text
 from tools.sweep_schema import make_sweep_schema

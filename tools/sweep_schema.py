@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from analysis.sweeps.plan import SweepPlan
+from analysis.batches.plan import SweepPlan
 from tools.scenario_schema import tidied
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from analysis.reporting.plain_values import plain
-from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.report.plain_values import plain
+from analysis.report.provenance import SCHEMA_VERSION, versions
 from analysis.runs.guarded_motion import halts_of
 from analysis.runs.metric_table import METRICS, run_metrics
 from diagrams import RunResult

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.report.provenance import SCHEMA_VERSION, versions
 from analysis.safety.driver_trials import (
     USUAL,
     Outcome,

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.report.provenance import SCHEMA_VERSION, versions
 from diagrams import load_scenario, simulate
 from diagrams.running.simulation import prepared_loop
 

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from analysis.reporting.markdown import markdown_table
-from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.report.markdown import markdown_table
+from analysis.report.provenance import SCHEMA_VERSION, versions
 from analysis.safety.driver_trials import (
     DRIVERS,
     LAYOUTS,

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from analysis.certificates.certificate_plots import (
+from analysis.energy.certificate_plots import (
     plot_certificate_trials,
     plot_energy_balance,
     plot_energy_certificate,
 )
-from analysis.certificates.certificate_trials import CertificateTrials, try_certificate
-from analysis.certificates.energy_certificate import EnergyCertificate, certify_energy
-from analysis.certificates.velocity_passivity import EnergyBalance, energy_balance
-from analysis.reporting.criterion import YES_OR_NO, Criterion, Reading
-from analysis.reporting.fact_tables import fact_table
-from analysis.reporting.plain_values import plain
-from analysis.reporting.section import Content, Figure
+from analysis.energy.certificate_trials import CertificateTrials, try_certificate
+from analysis.energy.energy_certificate import EnergyCertificate, certify_energy
+from analysis.energy.velocity_passivity import EnergyBalance, energy_balance
+from analysis.report.criterion import YES_OR_NO, Criterion, Reading
+from analysis.report.fact_tables import fact_table
+from analysis.report.plain_values import plain
+from analysis.report.section import Content, Figure
 from analysis.stability.law_analysis import Part, Study
 
 #: Number of simulated starts on each side of the border of the certified set.

@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
-from analysis.models.linear_models import LinearModel
-from analysis.reporting.criterion import Criterion, Verdict
-from analysis.reporting.section import Content, Note, Section
+from analysis.loops.linear_models import LinearModel
+from analysis.report.criterion import Criterion, Verdict
+from analysis.report.section import Content, Note, Section
 from analysis.run_error import failure_text
 from analysis.stability.model_sheet import ModelSheet, model_sheet
 from diagrams import Scenario
@@ -165,7 +165,7 @@ def _run(part: Part[Any], study: Study, analysis: LawAnalysis) -> Section:
     try:
         data = part.compute(study)
         section = part.section(data)
-        analysis.models.extend(part.models(data))
+        analysis.loops.extend(part.models(data))
         analysis.notes.extend(part.notes(data))
     except InputError as error:
         if not analysis.sections:

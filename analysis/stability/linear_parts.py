@@ -9,12 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from analysis.design.requirements import REQUIRED
-from analysis.linear.linear_plots import plot_equilibria, plot_step
-from analysis.linear.step_response import Oscillation, StepCheck, check_step
-from analysis.models.equilibria import EquilibriumSearch, find_equilibria
-from analysis.models.linear_models import LinearModel, Mode
-from analysis.models.linearisation import (
+from analysis.loops.equilibria import EquilibriumSearch, find_equilibria
+from analysis.loops.linear_models import LinearModel, Mode
+from analysis.loops.linear_plots import plot_equilibria, plot_step
+from analysis.loops.linearisation import (
     GradientCheck,
     RouteComparison,
     check_gradient,
@@ -22,10 +20,11 @@ from analysis.models.linearisation import (
     continuous_model,
     sampled_model,
 )
-from analysis.models.operating_points import OperatingPoint, moving_equilibrium
-from analysis.reporting.criterion import Criterion
-from analysis.reporting.plain_values import pick
-from analysis.reporting.section import (
+from analysis.loops.operating_points import OperatingPoint, moving_equilibrium
+from analysis.loops.step_response import Oscillation, StepCheck, check_step
+from analysis.report.criterion import Criterion
+from analysis.report.plain_values import pick
+from analysis.report.section import (
     ZERO,
     Cell,
     Column,
@@ -37,6 +36,7 @@ from analysis.reporting.section import (
 )
 from analysis.stability.law_analysis import Part, Study
 from analysis.stability.margin_parts import least_damped
+from analysis.stability.requirements import REQUIRED
 from diagrams import Scenario
 from systems.framework.input_error import InputError
 

@@ -11,34 +11,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.design.attraction_search import (
-    GainFigures,
-    RecommendedGains,
-    recommend_gains,
-)
-from analysis.design.requirements import REQUIRED
-from analysis.linear.gang_of_four import GangOfFour, gang_of_four
-from analysis.linear.heading_loop import HeadingLoopMargins, heading_loop_margins
-from analysis.linear.linear_plots import (
+from analysis.loops.gang_of_four import GangOfFour, gang_of_four
+from analysis.loops.heading_loop import HeadingLoopMargins, heading_loop_margins
+from analysis.loops.linear_models import LinearModel
+from analysis.loops.linear_plots import (
     plot_bode,
     plot_gang_of_four,
     plot_nichols,
     plot_nyquist,
 )
-from analysis.linear.loop_margins import (
+from analysis.loops.loop_margins import (
     DiskMargin,
     LoopMargins,
     PointMargins,
     all_margins,
     loop_margins,
 )
-from analysis.models.linear_models import LinearModel
-from analysis.models.open_loops import BREAK_POINTS, target_loop
-from analysis.models.operating_points import OperatingPoint
-from analysis.reporting.criterion import Criterion, Reading
-from analysis.reporting.plain_values import pick
-from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
+from analysis.loops.open_loops import BREAK_POINTS, target_loop
+from analysis.loops.operating_points import OperatingPoint
+from analysis.report.criterion import Criterion, Reading
+from analysis.report.plain_values import pick
+from analysis.report.section import Cell, Column, Content, Figure, Table, number
+from analysis.stability.attraction_search import (
+    GainFigures,
+    RecommendedGains,
+    recommend_gains,
+)
 from analysis.stability.law_analysis import Data, Part, Study
+from analysis.stability.requirements import REQUIRED
 
 #: Explanation of the margins for readers of the report.
 _EXPLANATION = (

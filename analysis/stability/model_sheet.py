@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from analysis.reporting.provenance import versions
+from analysis.report.provenance import versions
 from diagrams import Scenario, dump_scenario
 from diagrams.scenario.participants import Follower, Router
 from systems.framework.meanings import meanings

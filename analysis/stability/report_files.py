@@ -12,12 +12,12 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from analysis.models.model_export import write_models
-from analysis.reporting.criterion import Verdict, compare_verdicts, shown_value
-from analysis.reporting.plain_values import plain
-from analysis.reporting.provenance import SCHEMA_VERSION, versions
-from analysis.reporting.render import html, page, text
-from analysis.reporting.section import (
+from analysis.loops.model_export import write_models
+from analysis.report.criterion import Verdict, compare_verdicts, shown_value
+from analysis.report.plain_values import plain
+from analysis.report.provenance import SCHEMA_VERSION, versions
+from analysis.report.render import html, page, text
+from analysis.report.section import (
     Bullets,
     Cell,
     Column,
@@ -108,7 +108,7 @@ def write_stability(
     models = [
         replace(model, name=f"{analysis.law} {model.name}")
         for analysis in analyses
-        for model in analysis.models
+        for model in analysis.loops
     ]
     write_models(models, directory)
     scenario = analyses[0].scenario

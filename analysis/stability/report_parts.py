@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from analysis.reporting.section import Bullets
+from analysis.report.section import Bullets
 from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.law_analysis import Part
 from analysis.stability.linear_parts import LINEAR_MODELS, OPERATING_POINTS, STEP

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
-from analysis.linear.robustness import (
+from analysis.loops.linear_plots import plot_pole_cloud, plot_sensitivities
+from analysis.loops.robustness import (
     PoleCloud,
     PoleFunction,
     PoleSensitivity,
@@ -18,9 +18,9 @@ from analysis.linear.robustness import (
     pole_cloud,
     pole_sensitivities,
 )
-from analysis.reporting.criterion import Criterion
-from analysis.reporting.plain_values import pick
-from analysis.reporting.section import Column, Content, Figure, Table
+from analysis.report.criterion import Criterion
+from analysis.report.plain_values import pick
+from analysis.report.section import Column, Content, Figure, Table
 from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
 

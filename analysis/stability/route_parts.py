@@ -7,38 +7,38 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from analysis.linear.loop_margins import LoopMargins
-from analysis.reporting.criterion import Criterion, Reading
-from analysis.reporting.plain_values import pick
-from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
-from analysis.stability.law_analysis import Part, Study
-from analysis.stability.margin_parts import margin_criteria
-from analysis.trajectory.adaptation_stability import (
+from analysis.loops.loop_margins import LoopMargins
+from analysis.report.criterion import Criterion, Reading
+from analysis.report.plain_values import pick
+from analysis.report.section import Cell, Column, Content, Figure, Table, number
+from analysis.routes.adaptation_stability import (
     AdaptationStability,
     adaptation_stability,
 )
-from analysis.trajectory.chain_run import (
+from analysis.routes.chain_run import (
     BrakedChain,
     ChainRun,
     brake_chain,
     shake_chain,
 )
-from analysis.trajectory.frozen_gains import (
+from analysis.routes.frozen_gains import (
     WELL_DAMPED,
     FrozenPoint,
     GainBounds,
     frozen_gains,
     gain_bounds,
 )
-from analysis.trajectory.robot_chain import ROBOTS, RobotChain, robot_chain
-from analysis.trajectory.route_loop import route_law
-from analysis.trajectory.trajectory_plots import (
+from analysis.routes.robot_chain import ROBOTS, RobotChain, robot_chain
+from analysis.routes.route_loop import route_law
+from analysis.routes.trajectory_plots import (
     plot_adaptation,
     plot_braked_chains,
     plot_chain,
     plot_frozen_poles,
     plot_gain_bounds,
 )
+from analysis.stability.law_analysis import Part, Study
+from analysis.stability.margin_parts import margin_criteria
 from systems.ranging.parameters import OBJECT_SLOTS
 
 #: Fields of ``LoopMargins`` that the JSON document contains.

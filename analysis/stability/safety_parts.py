@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from analysis.reporting.plain_values import pick
-from analysis.reporting.section import Content, Table, number
+from analysis.report.plain_values import pick
+from analysis.report.section import Content, Table, number
 from analysis.stability.law_analysis import Part
 from diagrams.scenario.warnings.guarantees import Assumption, Guarantees, guarantees
 

@@ -10,25 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.design.requirements import REQUIRED
-from analysis.laws.radial_law import radial_law
-from analysis.linear.burst_cycle import (
+from analysis.loops.burst_cycle import (
     HOLDS,
     BurstCycle,
     BurstRun,
     burst_cycle,
     simulate_burst_cycle,
 )
-from analysis.linear.contact_mode import ContactLimits, contact_limits, contact_model
-from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
-from analysis.linear.delayed_run import DelayCheck, check_delay_margin
-from analysis.linear.linear_plots import plot_contact_limits, plot_delay_check
-from analysis.models.open_loops import DIRECTIONS
-from analysis.models.operating_points import OperatingPoint
-from analysis.reporting.criterion import Criterion, Reading
-from analysis.reporting.plain_values import pick
-from analysis.reporting.section import Cell, Column, Content, Figure, Table, number
+from analysis.loops.contact_mode import ContactLimits, contact_limits, contact_model
+from analysis.loops.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
+from analysis.loops.delayed_run import DelayCheck, check_delay_margin
+from analysis.loops.linear_plots import plot_contact_limits, plot_delay_check
+from analysis.loops.open_loops import DIRECTIONS
+from analysis.loops.operating_points import OperatingPoint
+from analysis.loops.radial_law import radial_law
+from analysis.report.criterion import Criterion, Reading
+from analysis.report.plain_values import pick
+from analysis.report.section import Cell, Column, Content, Figure, Table, number
 from analysis.stability.law_analysis import Part, Study
+from analysis.stability.requirements import REQUIRED
 from diagrams import Scenario
 
 #: Duration of the runs that check delay margins, s, in a short and in a full report.

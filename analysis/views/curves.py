@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.reporting.palette import COLOURS
+from analysis.report.palette import COLOURS
 from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
 from analysis.views.bursts import heard_bursts
 from diagrams import RunResult

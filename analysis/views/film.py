@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
 from numpy.typing import NDArray
 
-from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.report.palette import COLOURS, draw_grid
 from analysis.views.framing import run_title, tick_at
 from analysis.views.picture import map_axes
 from analysis.views.scene import (

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
-from analysis.reporting.palette import COLOURS
+from analysis.report.palette import COLOURS
 from analysis.runs.recorded_run import SCENARIO_FILE, RecordedRun
 from analysis.views.scene import (
     BODY_HEIGHT_M,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.reporting.palette import COLOURS
+from analysis.report.palette import COLOURS
 from analysis.runs.guarded_motion import guarded_motion
 from analysis.runs.tracked_bodies import tracked_bodies
 from analysis.views.scene import ROBOT_HEIGHT_M, Layer, Scene, Thing

@@ -17,9 +17,9 @@ from matplotlib.patches import Polygon, Rectangle, Wedge
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
-from analysis.reporting.body_labels import BodyLabel, spread_labels
-from analysis.reporting.notebook_figure import NotebookFigure
-from analysis.reporting.palette import COLOURS, draw_grid, faintest
+from analysis.report.body_labels import BodyLabel, spread_labels
+from analysis.report.notebook_figure import NotebookFigure
+from analysis.report.palette import COLOURS, draw_grid, faintest
 from analysis.runs.known_space import known_space
 from analysis.views.framing import bounds, picture_times, picture_title, tick_at
 from analysis.views.plume_history import concentration_map, plume_history

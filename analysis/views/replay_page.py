@@ -9,7 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from analysis.reporting.render import COLOURS_CSS
+from analysis.report.render import COLOURS_CSS
 from analysis.views.framing import run_title, shown_rectangle
 from analysis.views.scene import Layer, Scene
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reporting.plain_values import write_json
-from analysis.reporting.render import heading, html, page
-from analysis.reporting.section import (
+from analysis.report.plain_values import write_json
+from analysis.report.render import heading, html, page
+from analysis.report.section import (
     Content,
     Definitions,
     Files,

@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.colors import to_hex, to_rgb
 from numpy.typing import NDArray
 
-from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
+from analysis.report.palette import COLOURS, ROBOT_COLOURS
 from analysis.runs.contact import contact_point
 from analysis.runs.known_space import has_known_space
 from analysis.views.bursts import call_time, sound_bursts

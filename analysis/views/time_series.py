@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from analysis.reporting.notebook_figure import NotebookFigure
-from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.report.notebook_figure import NotebookFigure
+from analysis.report.palette import COLOURS, draw_grid
 from analysis.views.bursts import heard_bursts
 from analysis.views.curves import Curve, Panel, panels
 from analysis.views.framing import picture_title

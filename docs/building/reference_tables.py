@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from analysis.reporting.markdown import markdown_table
+from analysis.report.markdown import markdown_table
 from analysis.runs.columns import COLUMNS
 from analysis.runs.metric_table import GROUPS
 from diagrams.scenario.fields.field_list import list_fields

@@ -28,7 +28,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from analysis.reporting.markdown import markdown_table
+from analysis.report.markdown import markdown_table
 from analysis.runs.metric_table import GROUPS
 from docs.building.reference_tables import columns, commands, metrics, parameters
 

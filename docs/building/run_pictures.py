@@ -16,7 +16,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from analysis.sweeps.comparison_plans import comparison_plan
+from analysis.batches.comparison_plans import comparison_plan
 from analysis.views.block_diagram import block_svg
 from analysis.views.picture import plot_trajectory
 from diagrams import Scenario, build_sound_follower, load_scenario, simulate

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from analysis.hearing.localization import LocalizationCell, LocalizationExperiment
+    from analysis.arrays.localization import LocalizationCell, LocalizationExperiment
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -39,7 +39,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[AccuracyResult]:
-    from analysis.hearing.trial_counts import check_trials
+    from analysis.arrays.trial_counts import check_trials
     from diagrams.scenario.loading import load_scenario
 
     take(options.out)
@@ -48,7 +48,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[AccuracyResult]:
     check_trials(options.trials)
     say("measuring how well the robot locates sounds")
 
-    from analysis.hearing.localization import prepare_localization
+    from analysis.arrays.localization import prepare_localization
 
     experiment = prepare_localization(
         overrides,
@@ -71,7 +71,7 @@ class AccuracyResult(Result):
 
     @cached_property
     def _document(self) -> dict[str, Any]:
-        from analysis.hearing.localization_report import localization_document
+        from analysis.arrays.localization_report import localization_document
 
         return localization_document(self.experiment, self.cells)
 
@@ -81,13 +81,13 @@ class AccuracyResult(Result):
 
     def __str__(self) -> str:
         """Tables for a terminal."""
-        from analysis.hearing.localization_report import localization_text
+        from analysis.arrays.localization_report import localization_text
 
         return localization_text(self._document)
 
     def plot(self) -> Figure:
         """Draws the errors beside those of the papers."""
-        from analysis.hearing.localization_plots import plot_localization
+        from analysis.arrays.localization_plots import plot_localization
 
         return plot_localization(self.cells)
 
@@ -98,7 +98,7 @@ class AccuracyResult(Result):
             document: The JSON document, with the key ``out``.
             directory: Existing directory.
         """
-        from analysis.hearing.localization_report import write_localization
+        from analysis.arrays.localization_report import write_localization
 
         write_localization(self.experiment, self.cells, document, directory)
 

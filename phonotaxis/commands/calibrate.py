@@ -29,8 +29,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[CalibrationResult]:
-    from analysis.calibration.calibration_sounds import load_calibration_sounds
-    from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
+    from analysis.arrays.array_geometry import ArrayGeometry, load_geometry
+    from analysis.arrays.calibration_sounds import load_calibration_sounds
 
     sounds = load_calibration_sounds(options.sounds)
     given = options.geometry

@@ -29,7 +29,7 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
             remain on the disk.
         KeyboardInterrupt: An interrupt stopped the run, and no results remain.
     """
-    from analysis.reporting.result_directory import whole_directory
+    from analysis.report.result_directory import whole_directory
     from analysis.run_error import RunError, no_exit
 
     place: Place | None = None

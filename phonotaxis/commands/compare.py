@@ -60,8 +60,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[ComparisonResult]:
-    from analysis.sweeps.comparison_plans import comparison_plans
-    from analysis.sweeps.options import check_options
+    from analysis.batches.comparison_plans import comparison_plans
+    from analysis.batches.options import check_options
 
     check_options(options.out, workers=options.workers, resume=options.resume)
     plans = comparison_plans(

@@ -62,7 +62,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[Printed]:
-    from analysis.sweeps.options import check_options
+    from analysis.batches.options import check_options
     from systems.framework.input_error import InputError
 
     check_options(None, workers=options.workers)

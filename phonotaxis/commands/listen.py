@@ -11,7 +11,7 @@ from phonotaxis.commands.command import Command, Take
 from phonotaxis.result import Prepared
 
 if TYPE_CHECKING:
-    from analysis.listening.step_views import TextLines
+    from analysis.arrays.step_views import TextLines
     from phonotaxis.listening import ListenResult
 
 
@@ -82,7 +82,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[ListenResult]:
 
 
 def _teller(*, as_json: bool) -> TextLines:
-    from analysis.listening.step_views import JsonLines, Screen, TextLines
+    from analysis.arrays.step_views import JsonLines, Screen, TextLines
 
     if as_json:
         return JsonLines(sys.stdout, sys.stderr)

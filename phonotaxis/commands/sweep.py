@@ -33,8 +33,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[SweepResult]:
-    from analysis.sweeps.options import check_options
-    from analysis.sweeps.plan import load_sweep
+    from analysis.batches.options import check_options
+    from analysis.batches.plan import load_sweep
 
     check_options(
         options.out,

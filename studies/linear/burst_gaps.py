@@ -13,10 +13,10 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.linear.burst_cycle import HOLDS, Hold, burst_cycle
-from analysis.models.equilibria import follow_equilibrium
-from analysis.models.linear_models import NEUTRAL, growth_per_s
-from analysis.models.operating_points import OperatingPoint, motion_model
+from analysis.loops.burst_cycle import HOLDS, Hold, burst_cycle
+from analysis.loops.equilibria import follow_equilibrium
+from analysis.loops.linear_models import NEUTRAL, growth_per_s
+from analysis.loops.operating_points import OperatingPoint, motion_model
 from diagrams.scenario.scenario import Scenario
 
 
@@ -63,7 +63,7 @@ def gap_chart(
     With exact hearing this memory does not move the robot.
 
     Args:
-        scenario: Any scenario, see ``analysis.linear.burst_cycle.burst_cycle``.
+        scenario: Any scenario, see ``analysis.loops.burst_cycle.burst_cycle``.
         gaps_s: (n,) durations of the silence, multiples of the control period, s. The
             default is 0 to 4 s.
         holds: Ways of holding the target to compare: ``world``, ``robot``, ``motion``.

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
-from analysis.linear.linear_plots import panels
-from analysis.reporting.palette import COLOURS
+from analysis.loops.linear_plots import panels
+from analysis.report.palette import COLOURS
 from studies.linear.burst_gaps import GapChart
 from studies.linear.root_locus import RootLocus
 from studies.linear.sampled_stability import PolesAgainstPeriod, StabilityChart

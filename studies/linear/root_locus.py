@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.laws.radial_law import radial_law
-from analysis.linear.contact_mode import contact_model
-from analysis.models.linear_models import LinearModel
+from analysis.loops.contact_mode import contact_model
+from analysis.loops.linear_models import LinearModel
+from analysis.loops.radial_law import radial_law
 from diagrams.scenario.scenario import Scenario
 from systems.laws.catalogue import LAWS
 

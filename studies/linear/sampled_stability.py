@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.linear.contact_mode import contact_model, delayed_output, motion_chain
-from analysis.models.linear_models import LinearModel, growth_per_s
+from analysis.loops.contact_mode import contact_model, delayed_output, motion_chain
+from analysis.loops.linear_models import LinearModel, growth_per_s
 from diagrams.scenario.scenario import Scenario
 from systems.framework.signals import TICK_S
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.models.ideal_scenarios import changed, ideal_scenario
+from analysis.loops.ideal_scenarios import changed, ideal_scenario
 from diagrams import Scenario, simulate
 from studies.nonlinear.harmonic_balance import (
     OscillationPrediction,

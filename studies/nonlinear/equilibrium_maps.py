@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
-from analysis.models.ideal_scenarios import changed, ideal_scenario
-from analysis.models.point_mass import PointMass, point_mass
+from analysis.loops.ideal_scenarios import changed, ideal_scenario
+from analysis.loops.point_mass import PointMass, point_mass
 from diagrams import Scenario, simulate
 from systems.framework.input_error import InputError
 

@@ -3,7 +3,7 @@
 The robot's clearance is assumed to be c_0 + A exp(g t) sin(w t). The repulsion f(c, s)
 then has a mean and a first harmonic over a cycle. Both must agree with the motion that
 they cause according to the sampled model of the robot
-(``analysis.linear.contact_mode``). For each amplitude A, this balance gives the center
+(``analysis.loops.contact_mode``). For each amplitude A, this balance gives the center
 c_0, the growth rate g and the frequency w. The amplitude at which g changes from
 positive to negative is that of a limit cycle.
 """
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
 
-from analysis.linear.contact_mode import motion_chain
-from analysis.models.linear_models import LinearModel
+from analysis.loops.contact_mode import motion_chain
+from analysis.loops.linear_models import LinearModel
 from studies.nonlinear.head_on import HeadOn
 from studies.nonlinear.velocity_terms import Variant, sensed_speeds
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from analysis.laws.radial_law import RadialLaw, radial_law
+from analysis.loops.radial_law import RadialLaw, radial_law
 from diagrams import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.models.point_mass import PointMass, VelocityTermModel
+from analysis.loops.point_mass import PointMass, VelocityTermModel
 from diagrams import Scenario
 from studies.nonlinear.head_on import HeadOn, head_on
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analysis.reporting.palette import COLOURS
+from analysis.report.palette import COLOURS
 from studies.nonlinear.contact_oscillation import ContactOscillation
 from studies.nonlinear.equilibrium_maps import BOX_X_M, EquilibriumMap
 from studies.nonlinear.phase_portrait import PhasePortrait

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.certificates.certificate_trials import BATCH, draw_starts
-from analysis.certificates.energy_certificate import EnergyCertificate
-from analysis.models.diagram_state import set_discrete_state
-from analysis.models.ideal_scenarios import frozen_scenario, require_rolling
-from analysis.reporting.intervals import Estimate, estimate_rate
+from analysis.energy.certificate_trials import BATCH, draw_starts
+from analysis.energy.energy_certificate import EnergyCertificate
+from analysis.loops.diagram_state import set_discrete_state
+from analysis.loops.ideal_scenarios import frozen_scenario, require_rolling
+from analysis.report.intervals import Estimate, estimate_rate
 from analysis.runs.contact import touching_point
 from diagrams import (
     Scenario,

@@ -18,7 +18,7 @@ v_max then does not increase W.
 
 **Obstacle.** The obstacle moves at v_O, and the axes move with the obstacle. The
 velocity term of the law injects at most L |v|^2
-(``analysis.certificates.velocity_passivity``). The energy V then obeys
+(``analysis.energy.velocity_passivity``). The energy V then obeys
 
     V' <= sqrt(2 K_r V) v_O + D_r^2 v_O^2 / (4 (D_r - L))
 
@@ -35,8 +35,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.certificates.velocity_passivity import velocity_term_passivity
-from analysis.models.point_mass import PointMass, point_mass
+from analysis.energy.velocity_passivity import velocity_term_passivity
+from analysis.loops.point_mass import PointMass, point_mass
 from diagrams import Scenario
 from systems.world.geometry import beyond_each
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from analysis.reporting.palette import COLOURS
+from analysis.report.palette import COLOURS
 from studies.nonlinear.phase_portrait import certified_speeds, head_on_model
 from studies.proofs.disturbance_bounds import (
     DisturbanceBounds,

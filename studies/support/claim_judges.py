@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from analysis.reporting.intervals import Estimate, estimate_rate
+from analysis.report.intervals import Estimate, estimate_rate
 
 #: From a summary to our figure and the verdict.
 Judge = Callable[[dict[str, Any]], tuple[str, str]]

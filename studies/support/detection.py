@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.hearing.single_frames import Loudspeaker
+from analysis.arrays.single_frames import Loudspeaker
 from systems.framework.noise import tick_generator
 from systems.framework.signals import FRAME_SAMPLES, TICK_S
 from systems.hearing.localise import HearingMemory, Localiser

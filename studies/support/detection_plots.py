@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from analysis.reporting.intervals import estimate_rate
-from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.report.intervals import estimate_rate
+from analysis.report.palette import COLOURS, draw_grid
 from studies.support.detection import DetectionPoint, FalseAlarms
 
 #: Colours of the sounds, in turn.

@@ -11,7 +11,7 @@ import pyroomacoustics as pra
 from numpy.typing import NDArray
 from scipy import fft, signal
 
-from analysis.recordings.array_geometry import ArrayGeometry
+from analysis.arrays.array_geometry import ArrayGeometry
 
 RATE = 48_000
 C, SPEED_STD, DELAY_STD, GAIN_STD_DB = 343.0, 3.43, 2e-6, 2.0

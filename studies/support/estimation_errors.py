@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.reporting.intervals import Estimate
+from analysis.report.intervals import Estimate
 
 #: Confidence level of all intervals.
 CONFIDENCE = 0.95

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.hearing.cramer_rao import LocalizationBound, polar_point, position_bound
-from analysis.hearing.single_frames import Estimator, Loudspeaker
-from analysis.reporting.intervals import Estimate
+from analysis.arrays.cramer_rao import LocalizationBound, polar_point, position_bound
+from analysis.arrays.single_frames import Estimator, Loudspeaker
+from analysis.report.intervals import Estimate
 from studies.support.estimation_errors import (
     Consistency,
     consistency,

@@ -10,7 +10,7 @@ import numpy as np
 import pyroomacoustics as pra
 from numpy.typing import NDArray
 
-from analysis.hearing.single_frames import frame_estimator
+from analysis.arrays.single_frames import frame_estimator
 from systems.base.robot import RobotParameters
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.hearing.multilateration import locate_source

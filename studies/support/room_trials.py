@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.reporting.intervals import Estimate, estimate_rate
+from analysis.report.intervals import Estimate, estimate_rate
 from diagrams.scenario.bodies import microphones_W
 from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise, tick_generator

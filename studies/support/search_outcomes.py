@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.reporting.intervals import Estimate, estimate_rate
-from analysis.sweeps.one_run import Task, results_table, run_task
-from analysis.sweeps.plan import load_sweep
+from analysis.batches.one_run import Task, results_table, run_task
+from analysis.batches.plan import load_sweep
+from analysis.report.intervals import Estimate, estimate_rate
 
 #: Of the starts.
 SEED = 2026

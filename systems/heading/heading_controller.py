@@ -126,7 +126,7 @@ class HeadingController(Block):
     The discrete state has the integral part, the last deviation, and whether the robot
     moved at the last tick. The block updates the state at every tick. There is no
     latency. The paper uses a control period of 10 ms. Our control period of 25 ms
-    reduces the phase margin by one degree (``analysis.linear.heading_loop``).
+    reduces the phase margin by one degree (``analysis.loops.heading_loop``).
 
     Args:
         tick_s: Control period, s.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.sweeps.comparison_plans import comparison_plan
+from analysis.batches.comparison_plans import comparison_plan
 from diagrams import simulate
 
 pytestmark = pytest.mark.slow

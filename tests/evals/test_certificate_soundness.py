@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.energy_certificate import certify_energy
+from analysis.energy.certificate_trials import try_certificate
+from analysis.energy.energy_certificate import certify_energy
 from diagrams import Scenario, load_scenario
 from systems.framework.input_error import InputError
 

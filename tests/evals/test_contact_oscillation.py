@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.linear.contact_mode import contact_model
+from analysis.loops.contact_mode import contact_model
 from diagrams import load_scenario
 from studies.nonlinear.contact_oscillation import contact_oscillation
 from studies.nonlinear.harmonic_balance import predict_oscillation

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from analysis.linear.delay_margin import DELAY_PLACES, DelayedLoop
-from analysis.linear.delayed_run import check_delay_margin, simulate_delayed
-from analysis.models.equilibria import follow_equilibrium
+from analysis.loops.delay_margin import DELAY_PLACES, DelayedLoop
+from analysis.loops.delayed_run import check_delay_margin, simulate_delayed
+from analysis.loops.equilibria import follow_equilibrium
 from diagrams.scenario.scenario import Scenario
 
 T = 0.025

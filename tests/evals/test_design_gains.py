@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from analysis.design.requirements import Requirements, metres_to_go
-from analysis.laws.push_and_pull import DESIGNED_LAWS
-from analysis.sweeps.comparison_plans import comparison_plan
+from analysis.batches.comparison_plans import comparison_plan
+from analysis.loops.push_and_pull import DESIGNED_LAWS
+from analysis.stability.requirements import Requirements, metres_to_go
 from diagrams import load_scenario, simulate
 from diagrams.scenario.scenario import Scenario
 from phonotaxis import main

@@ -7,7 +7,7 @@ import math
 import pytest
 from scipy.stats import binomtest
 
-from analysis.hearing.single_frames import Loudspeaker
+from analysis.arrays.single_frames import Loudspeaker
 from studies.support.detection import FalseAlarms, detection_curve, false_alarms
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S

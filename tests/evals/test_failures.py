@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.batches.cells import failure_mechanisms
 from analysis.runs.metric_table import run_metrics
-from analysis.sweeps.cells import failure_mechanisms
 from diagrams import RunResult, load_scenario, simulate
 
 pytestmark = pytest.mark.slow

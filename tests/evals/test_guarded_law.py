@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from analysis.sweeps.comparison_plans import comparison_plan
+from analysis.batches.comparison_plans import comparison_plan
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 

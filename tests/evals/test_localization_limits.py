@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.hearing.localization import prepare_localization
-from analysis.hearing.localization_report import (
+from analysis.arrays.localization import prepare_localization
+from analysis.arrays.localization_report import (
     localization_document,
     localization_text,
 )
-from analysis.hearing.paper_tables import PAPER_CELLS
-from analysis.hearing.single_frames import Loudspeaker, frame_estimator
+from analysis.arrays.paper_tables import PAPER_CELLS
+from analysis.arrays.single_frames import Loudspeaker, frame_estimator
 from studies.support.free_field_trials import FreeFieldCell, run_cell, total_consistency
 from systems.base.robot import RobotParameters
 from systems.hearing.parameters import TDOAParameters

@@ -17,20 +17,20 @@ import pytest
 from scipy.ndimage import label
 from scipy.optimize import brentq
 
-from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.energy_certificate import certify_energy
-from analysis.linear.burst_cycle import burst_cycle
-from analysis.linear.delay_margin import DELAY_PLACES, delay_margin
-from analysis.linear.robustness import (
+from analysis.energy.certificate_trials import try_certificate
+from analysis.energy.energy_certificate import certify_energy
+from analysis.loops import linearisation
+from analysis.loops.burst_cycle import burst_cycle
+from analysis.loops.delay_margin import DELAY_PLACES, delay_margin
+from analysis.loops.equilibria import find_equilibria
+from analysis.loops.open_loops import closed, cut_model
+from analysis.loops.robustness import (
     contact_poles,
     contact_uncertainty,
     following_poles,
     following_uncertainty,
     pole_cloud,
 )
-from analysis.models import linearisation
-from analysis.models.equilibria import find_equilibria
-from analysis.models.open_loops import closed, cut_model
 from analysis.stability.law_analysis import Study, analyse_law
 from analysis.stability.linear_parts import count_jams
 from analysis.stability.report_parts import SOUND_PARTS

@@ -55,13 +55,13 @@ def attack(case: Case, *, seconds: float = 60.0) -> str:
 def _load() -> None:
     """Imports once what commands import: the cases run in forked processes."""
     for name in (
-        "analysis.design.design_text",
-        "analysis.hearing.localization_report",
-        "analysis.recordings.locate_text",
+        "analysis.stability.design_text",
+        "analysis.arrays.localization_report",
+        "analysis.arrays.locate_text",
         "analysis.runs.run_report",
         "analysis.stability.report_parts",
-        "analysis.sweeps.dask_cluster",
-        "analysis.sweeps.page",
+        "analysis.batches.dask_cluster",
+        "analysis.batches.page",
         "control",
         "matplotlib.figure",
         "scipy.signal",

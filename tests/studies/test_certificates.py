@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.energy_certificate import certify_energy
+from analysis.energy.certificate_trials import try_certificate
+from analysis.energy.energy_certificate import certify_energy
 from studies import certificates as table
 from studies.__main__ import main
 from studies.proofs.diagram_trials import try_diagram

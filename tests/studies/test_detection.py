@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from analysis.hearing.single_frames import Loudspeaker
+from analysis.arrays.single_frames import Loudspeaker
 from studies.support import detection
 from studies.support.detection import detection_curve, false_alarms
 from systems.base.robot import RobotParameters

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import fft
 
-from analysis.hearing.single_frames import Loudspeaker, frame_estimator
+from analysis.arrays.single_frames import Loudspeaker, frame_estimator
 from studies.support.free_field_trials import run_cell, total_consistency
 from systems.base.robot import RobotParameters
 from systems.hearing.parameters import TDOAParameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.linear.contact_mode import largest_contact_stiffness
+from analysis.loops.contact_mode import largest_contact_stiffness
 from analysis.stability.sampling_parts import contact_growth
 from diagrams.scenario.scenario import Scenario
 from studies.linear_stability import apart, limit_rows

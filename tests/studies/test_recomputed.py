@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.energy_certificate import certify_energy
-from analysis.reporting.intervals import estimate_rate
+from analysis.energy.certificate_trials import try_certificate
+from analysis.energy.energy_certificate import certify_energy
+from analysis.report.intervals import estimate_rate
 from diagrams import load_scenario
 from studies import certificates, laws_before_obstacles, library_runs, linear_stability
 from tests.results import assert_same_rows, documented, numbers

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
-from analysis.sweeps.comparison_plans import library_layouts
+from analysis.batches.comparison_plans import library_layouts
 from studies.support.search_outcomes import search_outcomes, search_runs
 
 

@@ -17,7 +17,7 @@ from systems.laws.trajectory.trajectory_conventional import (
 #: of the adaptation, and a is the amplitude of P's target, m. T is the control
 #: period, s, and M is the virtual mass, kg. Below the bound, K and D do not run away.
 #: The values are rounded down from the results of ``critical_rate`` in
-#: ``analysis.trajectory.adaptation_stability``. These results are for periods of 25 to
+#: ``analysis.routes.adaptation_stability``. These results are for periods of 25 to
 #: 100 ms and a reference with the nominal gains. Other references have lower bounds.
 RATE_BOUNDS = {"lyapunov": 1.0, "sensitivity": 0.5}
 #: Largest stiffness in the search for the bound, N/m.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.arrays.array_budget import ArrayBudget
-from analysis.hearing.sensitivity import ArrayErrors, predicted_std
+from analysis.arrays.sensitivity import ArrayErrors, predicted_std
 from systems.hearing.multilateration import locate_source
 from systems.sound.array_shape import ArrayShape
 

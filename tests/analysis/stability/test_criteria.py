@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.certificates.energy_certificate import certify_energy
+from analysis.energy.energy_certificate import certify_energy
 from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANCE
 from analysis.stability.linear_parts import (
     LINEAR_MODELS,

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from analysis.reporting.criterion import Criterion
+from analysis.report.criterion import Criterion
 from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import Part, analyse_law
 from analysis.stability.linear_parts import OPERATING_POINTS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.reporting.render import formula_svg
+from analysis.report.render import formula_svg
 from analysis.stability.model_sheet import model_sheet
 from diagrams import load_scenario
 from systems.laws.catalogue import LAWS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.models.ideal_scenarios import ideal_scenario, require_ideal
+from analysis.loops.ideal_scenarios import ideal_scenario, require_ideal
 from analysis.stability.choice import chosen_laws, chosen_robot
 from analysis.stability.law_analysis import analyse_law
 from analysis.stability.report_files import (

@@ -14,7 +14,7 @@ import soundfile
 from matplotlib.colors import to_rgb
 from PIL import Image, ImageSequence
 
-from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
+from analysis.report.palette import COLOURS, ROBOT_COLOURS
 from analysis.run_error import RunError
 from analysis.views.film import RunFrames, circles
 from analysis.views.movie_file import MovieFile

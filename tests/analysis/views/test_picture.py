@@ -10,7 +10,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon, Rectangle, Wedge
 
-from analysis.reporting.palette import COLOURS
+from analysis.report.palette import COLOURS
 from analysis.runs.contact import contact_point
 from analysis.runs.known_space import known_space
 from analysis.views.bursts import sound_bursts

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.reporting.palette import COLOURS
+from analysis.report.palette import COLOURS
 from analysis.views.overlays import overlays
 from analysis.views.scene import Cone, Thing, Touched, compose, make_scene
 from diagrams import load_scenario, simulate

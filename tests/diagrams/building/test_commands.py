@@ -169,9 +169,9 @@ def test_our_laws_command_an_acceleration(law):
 
 
 def test_linear_models_are_refused(constants):
-    from analysis.laws.law_curves import law_curves
-    from analysis.models.ideal_loop import ideal_loop
-    from analysis.models.ideal_scenarios import ideal_scenario
+    from analysis.loops.ideal_loop import ideal_loop
+    from analysis.loops.ideal_scenarios import ideal_scenario
+    from analysis.loops.law_curves import law_curves
 
     scenario = ideal_scenario(Scenario(law=f"{constants}:Twist"))
     with pytest.raises(InputError, match="no output port acceleration_W"):

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import LeafSystem
 
-from analysis.listening.live_hearing import HeardStep, LiveHearing, listen_to
-from analysis.listening.sound_pipe import open_pipe
-from analysis.recordings.array_geometry import load_geometry
+from analysis.arrays.array_geometry import load_geometry
+from analysis.arrays.live_hearing import HeardStep, LiveHearing, listen_to
+from analysis.arrays.sound_pipe import open_pipe
 from diagrams import (
     RunAudio,
     build_sound_follower,

@@ -13,7 +13,7 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
-from analysis.recordings.array_geometry import load_geometry
+from analysis.arrays.array_geometry import load_geometry
 from diagrams import (
     RunAudio,
     build_sound_follower,

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from analysis.laws.radial_law import radial_law
-from analysis.models.ideal_loop import ideal_loop
+from analysis.loops.ideal_loop import ideal_loop
+from analysis.loops.radial_law import radial_law
 from diagrams import Scenario, load_scenario
 from diagrams.running.compiled.loop_blocks import shared_blocks
 from diagrams.scenario.own_code import (

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from analysis.linear.burst_cycle import burst_cycle
-from analysis.linear.contact_mode import contact_model, largest_contact_stiffness
-from analysis.models.equilibria import follow_equilibrium
+from analysis.loops.burst_cycle import burst_cycle
+from analysis.loops.contact_mode import contact_model, largest_contact_stiffness
+from analysis.loops.equilibria import follow_equilibrium
 from diagrams.scenario.scenario import Scenario
 from studies.linear.burst_gaps import gap_chart
 from studies.linear.root_locus import root_loci

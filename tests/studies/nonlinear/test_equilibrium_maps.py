@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.models.equilibria import find_equilibria
-from analysis.models.point_mass import point_mass
+from analysis.loops.equilibria import find_equilibria
+from analysis.loops.point_mass import point_mass
 from studies.nonlinear.equilibrium_maps import (
     boxes_scenario,
     gap_map,

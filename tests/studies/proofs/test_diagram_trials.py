@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.energy_certificate import certify_energy
+from analysis.energy.certificate_trials import try_certificate
+from analysis.energy.energy_certificate import certify_energy
 from diagrams.running.stop_rules import Collision
 from studies.proofs.diagram_trials import _mechanism, _pose, try_diagram
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from analysis.models.point_mass import point_mass
+from analysis.loops.point_mass import point_mass
 from studies.proofs.disturbance_bounds import (
     _certified_time,
     _peak_gain,

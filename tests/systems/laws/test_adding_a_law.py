@@ -24,12 +24,12 @@ QUESTIONS = """
 import contextlib, io, json
 
 import phonotaxis
-from analysis.sweeps.comparison_plans import comparison_plans
-from analysis.design.gain_search import search_gains
-from analysis.design.requirements import Requirements, check_law
-from analysis.laws.law_curves import law_curves, plot_law_curves
-from analysis.laws.push_and_pull import DESIGNED_LAWS
-from analysis.laws.radial_law import radial_law
+from analysis.batches.comparison_plans import comparison_plans
+from analysis.stability.gain_search import search_gains
+from analysis.stability.requirements import Requirements, check_law
+from analysis.loops.law_curves import law_curves, plot_law_curves
+from analysis.loops.push_and_pull import DESIGNED_LAWS
+from analysis.loops.radial_law import radial_law
 from studies.linear.root_locus import root_loci
 from analysis.stability.choice import chosen_laws
 from analysis.stability.law_analysis import analyse_law

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from analysis.sweeps.plan import SweepPlan
-from analysis.sweeps.sweep import reproducing_command
+from analysis.batches.plan import SweepPlan
+from analysis.batches.sweep import reproducing_command
 from diagrams import Scenario, dump_scenario, load_scenario, simulate
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.sensor_presets import SENSOR_PRESETS

@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from analysis.sweeps.sweep_file import SWEEP_SCHEMA_FILE
+from analysis.batches.sweep_file import SWEEP_SCHEMA_FILE
 from diagrams.scenario.fields.shipped import SCHEMA_FILE
 from diagrams.scenario.loading import read_mapping
 from tools.scenario_schema import make_schema

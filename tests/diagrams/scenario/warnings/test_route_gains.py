@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import phonotaxis
-from analysis.linear.contact_mode import largest_contact_stiffness
-from analysis.trajectory.adaptation_stability import swinging_target
-from analysis.trajectory.point_run import PointLoop, run_point
+from analysis.loops.contact_mode import largest_contact_stiffness
+from analysis.routes.adaptation_stability import swinging_target
+from analysis.routes.point_run import PointLoop, run_point
 from diagrams import load_scenario
 from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.laws.trajectory.impedance_adaptation import (

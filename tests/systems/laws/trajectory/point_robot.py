@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.trajectory.point_run import PointLoop, run_point
+from analysis.routes.point_run import PointLoop, run_point
 from systems.base.robot import RobotParameters
 from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 

@@ -1,0 +1,101 @@
+"""Describes a located source in text for a terminal."""
+
+from __future__ import annotations
+
+from analysis.arrays.locate_result import LocatedSource, SourceEstimate
+
+_WHY_NOTHING = (
+    "; the recording is silent or noise, or the positions (in m) or the speed of "
+    "sound do not match the array, or the source is within 0.2 m of its center"
+)
+
+_COLUMNS = (
+    ("bearing_deg", "bearing/deg", 11, 2),
+    ("bearing_std_deg", "std", 7, 3),
+    ("elevation_deg", "elevation/deg", 13, 1),
+    ("elevation_std_deg", "std", 6, 2),
+    ("range_m", "range/m", 8, 3),
+    ("range_std_m", "std", 7, 3),
+)
+
+
+def locate_text(result: LocatedSource) -> str:
+    """Describes a result by a summary and one row per estimate."""
+    heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
+    if not result.estimates:
+        return f"{heard}: nothing to locate{_WHY_NOTHING}"
+    lines = [heard, *_direction(result), _range(result), *_sources(result)]
+    lines.append("")
+    lines.append("    t/s" + "".join(f"  {name:>{w}}" for _, name, w, _ in _COLUMNS))
+    lines += [_row(estimate) for estimate in result.estimates]
+    return "\n".join(lines)
+
+
+def _direction(result: LocatedSource) -> list[str]:
+    summary = result.main_source()
+    parts = []
+    if summary["bearing_deg"] is not None:
+        parts.append(
+            f"bearing {summary['bearing_deg']:.2f} deg (std "
+            f"{summary['bearing_std_deg']:.2f}, of which "
+            f"{summary['bearing_systematic_deg']:.2f} from errors of array and air)"
+        )
+    if summary["elevation_deg"] is not None:
+        parts.append(
+            f"elevation {summary['elevation_deg']:.1f} deg "
+            f"(std {summary['elevation_std_deg']:.1f})"
+        )
+    lines = [
+        ", ".join(parts)
+        or "direction not observable: the row of microphones is slanted"
+    ]
+    for other in summary["alternatives"]:
+        text = f"or bearing {other['bearing_deg']:.2f} deg"
+        if other["elevation_deg"] is not None:
+            text += f", elevation {other['elevation_deg']:.1f} deg"
+        cause = "a row" if summary["ambiguity"] == "front_back" else "a plane"
+        lines.append(f"{text}: {cause} of microphones cannot distinguish them")
+    if summary["elevation_deg"] is None:
+        lines.append("elevation not observable with this array")
+    return lines
+
+
+def _range(result: LocatedSource) -> str:
+    summary = result.main_source()
+    ranges = [e.range_m for e in result.estimates if e.range_m is not None]
+    if summary["range_m"] is None and ranges:
+        return (
+            f"no single range: {len(ranges)} of {len(result.estimates)} estimates have "
+            f"one, from {min(ranges):.3f} to {max(ranges):.3f} m"
+        )
+    if summary["range_m"] is None:
+        size = 100.0 * result.shape.aperture_m
+        return f"range not observable (microphones within {size:.1f} cm)"
+    return (
+        f"range {summary['range_m']:.3f} m (std {summary['range_std_m']:.3f}, of "
+        f"which {summary['range_systematic_m']:.3f} from errors of array and air, "
+        "equal in all)"
+    )
+
+
+def _sources(result: LocatedSource) -> list[str]:
+    sources = result.heard.sources
+    if result.heard.steady:
+        return ["the sound is steady: the number of sources is unknown"]
+    if len(sources) < 2:
+        return []
+    lines = [f"{len(sources)} sources; the lines above describe the main source"]
+    lines += [
+        f"  bearing {source.bearing_deg:7.1f} deg, {100.0 * source.share:3.0f} % of "
+        f"what is heard, confidence {source.confidence:.2f}"
+        for source in sources
+    ]
+    return lines
+
+
+def _row(estimate: SourceEstimate) -> str:
+    row = f"{estimate.t_s:7.3f}"
+    for name, _, width, digits in _COLUMNS:
+        value = getattr(estimate, name)
+        row += f"  {'-':>{width}}" if value is None else f"  {value:{width}.{digits}f}"
+    return row

@@ -1,0 +1,250 @@
+"""Reads recordings, checks that an array can have made them, and corrects channels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.arrays.array_geometry import (
+    LEAST_BAND_HZ,
+    ROBOT_ARRAY,
+    ArrayGeometry,
+    usable_band,
+)
+from analysis.arrays.channel_faults import ChannelFault, find_channel_faults
+from analysis.arrays.clock_drift import recording_drift
+from analysis.arrays.frame_delays import exchanged
+from analysis.arrays.recording_search import RecordingSearch
+from analysis.arrays.recording_spectra import RecordingSpectra
+from systems.framework.input_error import InputError
+from systems.sound.sound_file import read_sound
+
+_RATES_HZ = (8_000, 192_000)
+
+#: Numbers of snapshots per stretch to try, in this order. A faint or distant source
+#: needs more snapshots.
+SNAPSHOTS = (8, 32, 128)
+#: Number of stretches with a source that ends the trials.
+LEAST_SIGHTINGS = 3
+
+# Kinds of faults that make it impossible to locate a source.
+_FATAL = ("nan", "dead", "copied", "units", "drift")
+
+# Largest number of channels in one message.
+_MOST_NAMED = 8
+
+
+class RecordedSamples(NamedTuple):
+    """A recording in memory. Its channels and rate match the array it was read for."""
+
+    samples: NDArray[np.float64]
+    """(channels, samples) recorded sound; full scale is 1."""
+    rate: int
+    """Sample rate, Hz."""
+    name: str
+    """Name of the recording in messages."""
+
+
+def recorded_samples(
+    recording: str | Path | ArrayLike,
+    geometry: ArrayGeometry,
+    sample_rate_hz: float | None = None,
+) -> RecordedSamples:
+    """Reads a file or takes (channels, samples) samples, and checks them for the array.
+
+    A file states its own rate, and ``sample_rate_hz`` is then None.
+    """
+    if isinstance(recording, str | Path):
+        if sample_rate_hz is not None:
+            raise InputError(
+                "sample_rate_hz",
+                "applies to samples only; leave it out, because a file states its "
+                "own rate",
+            )
+        samples, rate = read_sound(recording, "recording")
+        found = RecordedSamples(samples, rate, repr(str(recording)))
+    else:
+        found = _given(recording, sample_rate_hz)
+    if complaint := array_mismatch(geometry, len(found.samples), found.rate):
+        raise InputError("recording", f"{found.name} {complaint}")
+    return found
+
+
+def _given(recording: ArrayLike, sample_rate_hz: float | None) -> RecordedSamples:
+    if sample_rate_hz is None:
+        raise InputError("sample_rate_hz", "is missing; give the sample rate in Hz")
+    if not (math.isfinite(sample_rate_hz) and sample_rate_hz == round(sample_rate_hz)):
+        raise InputError(
+            "sample_rate_hz", f"is {sample_rate_hz!r}; give a whole number of Hz"
+        )
+    given = np.asarray(recording)
+    where = f"array of shape {given.shape}"
+    if given.dtype.kind not in "iuf":
+        raise InputError("recording", f"{where} holds no numbers; give samples")
+    if given.ndim != 2 or len(given) > given.shape[1]:
+        raise InputError(
+            "recording",
+            f"{where}; give (microphones, samples), one row per microphone: transpose "
+            "the result of soundfile.read",
+        )
+    samples = given.astype(np.float64)
+    if given.dtype.kind in "iu":
+        samples /= np.iinfo(given.dtype).max  # full scale is 1, as in files
+    if not np.isfinite(samples).all() or not samples.any():
+        raise InputError(
+            "recording", f"{where} is silent or not finite; give recorded samples"
+        )
+    return RecordedSamples(samples, round(sample_rate_hz), where)
+
+
+def array_mismatch(geometry: ArrayGeometry, channels: int, rate: int) -> str:
+    """Explains why an array cannot have made a recording.
+
+    The text continues a sentence that begins with the name of the recording. It is
+    empty if the array can have made the recording.
+    """
+    count, needed = channels, len(geometry.microphones)
+    if geometry.channels is not None and max(geometry.channels) >= count >= needed:
+        return (
+            f"has {count} channels, numbers 0 to {count - 1}; 'channels' in the "
+            f"geometry file counts from 0 and names {max(geometry.channels)}"
+        )
+    if max(geometry.columns) >= count:
+        what = "is mono" if count == 1 else f"has {count} channels"
+        return (
+            f"{what}, but the array needs {max(needed, max(geometry.columns) + 1)}; "
+            "record every microphone on a channel of its own"
+        )
+    if geometry.channels is None and count > needed:
+        default = geometry.microphones == ROBOT_ARRAY.microphones
+        remedy = (
+            "give the positions of its microphones with --geometry FILE"
+            if default
+            else "name the channels to use in the geometry file, for example "
+            f"'channels: {list(range(needed))}'"
+        )
+        whose = "the robot's own array" if default else "the array"
+        return f"has {count} channels, but {whose} {needed} microphones; {remedy}"
+    if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
+        low, high = _RATES_HZ
+        return f"has a sample rate of {rate} Hz; record at {low} to {high} Hz"
+    if geometry.band is not None and rate < 2.0 * geometry.band[1]:
+        return (
+            f"has a sample rate of {rate} Hz, below twice the band's upper end of "
+            f"{geometry.band[1]:g} Hz; lower the band or record at a higher rate"
+        )
+    return ""
+
+
+def chosen_microphones(geometry: ArrayGeometry, chosen: Sequence[int]) -> ArrayGeometry:
+    """Makes the geometry of an array with only the chosen microphones, counted from 0.
+
+    Raises a ValueError if there are too few chosen microphones for an array.
+    """
+    fields = geometry.model_dump(exclude_unset=True)
+    fields["microphones"] = [geometry.microphones[k] for k in chosen]
+    fields["channels"] = [geometry.columns[k] for k in chosen]
+    if isinstance(std := geometry.position_std_m, tuple):
+        fields["position_std_m"] = [std[k] for k in chosen]
+    if geometry.position_covariance_m2 is not None:
+        matrix = np.array(geometry.position_covariance_m2)
+        axes = len(geometry.microphones[0])
+        if len(matrix) > axes:
+            rows = [axes * k + axis for k in chosen for axis in range(axes)]
+            fields["position_covariance_m2"] = matrix[np.ix_(rows, rows)].tolist()
+    return ArrayGeometry(**fields)
+
+
+def prepared_recording(
+    recorded: RecordedSamples,
+    geometry: ArrayGeometry,
+    *,
+    top_hz: float = math.inf,
+    trusts_positions: bool = True,
+) -> tuple[RecordingSpectra, list[ChannelFault]]:
+    """Returns the spectra of the array's channels, and the faults worth reporting.
+
+    Inverted channels are corrected. Frequencies above ``top_hz`` are not used, but the
+    band is at least 500 Hz wide. If the positions of the microphones are uncertain,
+    delays cannot reveal exchanged channels or drifting clocks.
+    """
+    samples, rate, where = recorded
+    known = geometry.known
+    shape = known.shape
+    whole = geometry.columns == tuple(range(len(samples)))
+    channels = samples if whole else samples[list(geometry.columns)]
+    low, high = usable_band(geometry.band, rate)
+    high = min(high, max(top_hz, low + LEAST_BAND_HZ))
+
+    def spectra(channels: NDArray[np.float64]) -> RecordingSpectra:
+        equal = np.empty(channels.shape, dtype=np.float32)
+        for row, channel in zip(equal, channels, strict=True):
+            row[:] = (channel - channel.mean()) / channel.std()
+        return RecordingSpectra(equal, float(rate), low, high, shape.max_delay(known.c))
+
+    def agreement(channels: NDArray[np.float64]) -> float:
+        search = RecordingSearch(spectra(channels), shape, known.c, SNAPSHOTS[0])
+        return search.mean_response()
+
+    drift = None
+    if trusts_positions:
+        drift = recording_drift(channels, float(rate), shape.p_AM, known.c)
+    # The delays of drifting channels fit no position, so no other check of delays
+    # applies.
+    faults = (
+        [drift]
+        if drift
+        else find_channel_faults(
+            channels, known, sample_rate_hz=float(rate), band_hz=geometry.band
+        )
+    )
+    if not trusts_positions:
+        faults = [fault for fault in faults if fault.kind != "swapped"]
+    channels, faults = channels_without_faults(channels, faults, agreement, where)
+    recording = spectra(channels)
+    if not recording.starts.size:
+        raise InputError(
+            "recording",
+            f"{where} has {channels.shape[1]} samples, fewer than one frame of "
+            f"{recording.window.size}; record longer",
+        )
+    return recording, faults
+
+
+def channels_without_faults(
+    samples: NDArray[np.float64],
+    faults: list[ChannelFault],
+    agreement: Callable[[NDArray[np.float64]], float],
+    where: str,
+) -> tuple[NDArray[np.float64], list[ChannelFault]]:
+    """Corrects inverted channels, and rejects recordings with serious faults.
+
+    Exchanged channels are not corrected. Either the cables or the geometry file may be
+    wrong, and only the user can know which. The result of ``agreement`` is larger if
+    channels fit the geometry better. The returned faults are those that remain worth
+    reporting.
+    """
+    fatal = [fault for fault in faults if fault.kind in _FATAL]
+    if fatal:
+        first, *rest = fatal
+        further = sorted({k + 1 for f in rest for k in f.channels if f is not first})
+        names = ", ".join(map(str, further[:_MOST_NAMED]))
+        names += " ..." if len(further) > _MOST_NAMED else ""
+        more = f"; check channels {names} as well" if rest else ""
+        raise InputError("recording", f"{where}: {first.message}{more}")
+    inverted = [k for f in faults if f.kind == "inverted" for k in f.channels]
+    if inverted:
+        samples = samples.copy()
+        samples[inverted] *= -1.0
+    as_given = agreement(samples) if any(f.kind == "swapped" for f in faults) else 0.0
+    for fault in faults:
+        pairs = combinations(fault.channels, 2) if fault.kind == "swapped" else ()
+        if any(agreement(exchanged(samples, *pair)) > as_given for pair in pairs):
+            raise InputError("recording", f"{where}: {fault.message}")
+    return samples, [fault for fault in faults if fault.kind != "swapped"]

@@ -1,0 +1,177 @@
+"""Plans of comparisons: the layouts, the laws and the other fields to compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+import diagrams
+from analysis.batches.plan import SweepPlan, load_sweep
+from diagrams.scenario.fields.explain import explain
+from diagrams.scenario.loading import load_scenario, read_mapping
+from diagrams.scenario.scenario import Scenario, scenario_from_mapping
+from diagrams.scenario.settings import parse_setting
+from systems.framework.input_error import InputError
+from systems.laws.catalogue import FORCE_LAWS, ROUTE_LAWS
+
+#: Names of the scenarios of the papers' experiments.
+EXPERIMENTS = (
+    "obstacle_free",
+    "two_static_obstacles",
+    "one_moving_obstacle",
+    "two_moving_obstacles",
+)
+VELOCITY_TERM = "collision_vector.velocity_term"
+_LIBRARY = Path(diagrams.__file__).parent / "layouts"
+#: Fields of a sweep file that a comparison sets. Files of layouts must not set them.
+_OURS = ("grid", "runs", "pair")
+
+
+def library_layouts() -> dict[str, Path]:
+    """Returns the files of the layouts that come with the package, by name."""
+    return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
+
+
+def comparison_plan(
+    scenario: str,
+    *,
+    laws: Iterable[str] | None = None,
+    runs: int = 50,
+    seed: int = 1,
+    settings: dict[str, Any] | None = None,
+    grid: Mapping[str, Sequence[Any]] | None = None,
+) -> SweepPlan:
+    """Plans the runs that compare control laws on the layouts of one scenario.
+
+    A layout is one variant of the positions and motions of all bodies. Every law meets
+    the same layouts with the same seeds. The other arguments are fields of
+    ``SweepPlan``.
+
+    - A library name selects layouts of the library.
+    - A YAML file of layouts is a sweep file without ``grid``, ``runs`` and ``pair``.
+    - A YAML file of a scenario has a single layout, and its runs differ only in their
+      random numbers.
+
+    Each run uses one law for all robots. By default, the laws are those of the papers
+    and driving without avoidance; for a scenario with routes, they are the laws for
+    routes.
+    """
+    plan = _layouts(scenario)
+    base = scenario_from_mapping(plan.base)
+    _require_one_law(base, plan.base)
+    if laws is None:
+        routed = any(robot.kind == "router" for robot in base.robots.values())
+        laws = ROUTE_LAWS if routed else FORCE_LAWS
+    for key, values in (grid or {}).items():
+        if isinstance(values, str):  # it would be read letter by letter
+            raise InputError(f"grid.{key}", f"is {values!r}; give a list of values")
+    fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
+    fields |= {
+        "set": plan.set | (settings or {}),
+        "grid": {"law": tuple(laws), **{k: tuple(v) for k, v in (grid or {}).items()}},
+        "runs": runs,
+        "seed": seed,
+        "pair": True,
+    }
+    try:
+        return SweepPlan.model_validate(fields)
+    except ValidationError as error:
+        raise explain(error, SweepPlan.model_json_schema(), "a comparison") from None
+
+
+def _require_one_law(base: Scenario, written: Mapping[str, Any]) -> None:
+    """Rejects scenarios whose robots cannot all get the same law."""
+    for name, robot in base.robots.items():
+        if robot.searches is not None:
+            raise InputError(
+                "scenario",
+                f"{base.name!r} is a search by law {robot.law!r}, and no other law can "
+                "replace it; sweep its fields instead, for example search.rules "
+                "(docs/searches.md)",
+            )
+        if "law" in written.get("robots", {}).get(name, {}):
+            raise InputError(
+                f"robots.{name}.law",
+                f"is {robot.law!r}, but a comparison sets the laws of all robots; "
+                "leave it out",
+            )
+
+
+def comparison_plans(
+    scenarios: Sequence[str] = (),
+    *,
+    laws: str | None = None,
+    velocity_terms: str | None = None,
+    runs: int = 50,
+    seed: str | None = None,
+    settings: Iterable[str] = (),
+    grid: Iterable[str] = (),
+) -> dict[str, SweepPlan]:
+    """Plans a comparison for each scenario of a command line, by name of the scenario.
+
+    The name has neither folder nor file ending. Without scenarios, the plans are those
+    for the experiments of the papers. All other arguments are options of the command;
+    lists are separated by commas, and settings have the form ``key=value``. For the
+    defaults, see ``comparison_plan``. Raises InputError, which names the option or the
+    field, if an argument is not valid.
+    """
+    fields = dict(parse_setting(text) for text in settings)
+    varied = dict(_listed_values(text) for text in grid)
+    if velocity_terms is not None:
+        terms = velocity_terms.split(",")
+        if len(terms) == 1:
+            fields[VELOCITY_TERM] = terms[0]
+        else:
+            varied[VELOCITY_TERM] = terms
+    plans: dict[str, SweepPlan] = {}
+    for scenario in scenarios or EXPERIMENTS:
+        name = Path(scenario).stem
+        if name in plans:
+            raise InputError("scenario", f"{name} is listed twice; remove one")
+        plans[name] = comparison_plan(
+            scenario,
+            laws=None if laws is None else laws.split(","),
+            runs=runs,
+            seed=_whole_seed(seed),
+            settings=fields,
+            grid=varied,
+        )
+    return plans
+
+
+def _layouts(scenario: str) -> SweepPlan:
+    library = library_layouts()
+    if scenario in library:
+        return load_sweep(library[scenario])
+    path = Path(scenario)
+    if path.suffix in (".yaml", ".yml") and path.is_file():
+        data = read_mapping(path)
+        if "scenario" in data:
+            for key in _OURS:
+                if key in data:
+                    raise InputError(
+                        f"{scenario}: {key}",
+                        "is set by the comparison; remove it, or use sweep",
+                    )
+            return load_sweep(path)
+    load_scenario(scenario)
+    return SweepPlan(name=path.stem, scenario=scenario)
+
+
+def _listed_values(text: str) -> tuple[str, list[Any]]:
+    """Splits ``key=[value, ...]`` into the key and the list of values."""
+    key, values = parse_setting(text)
+    if not isinstance(values, list):
+        raise InputError(key, f"{values!r} is not a list of values; write [a, b]")
+    return key, values
+
+
+def _whole_seed(text: str | None) -> int:
+    if text is None:
+        return 1
+    if not text.isdigit():
+        raise InputError("seed", f"{text!r} is not a whole number; give 0 or more")
+    return int(text)

@@ -1,1 +1,0 @@
-"""Calibrates microphone arrays from sounds: microphone positions and speed of sound."""

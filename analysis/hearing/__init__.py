@@ -1,1 +1,0 @@
-"""Measures how well sounds are located: bounds, trials, tables and recordings."""

@@ -1,1 +1,0 @@
-"""Results from linear models: margins, delay, sampling, bursts, contact, robustness."""

@@ -1,1 +1,0 @@
-"""Listens to live sound: streams of samples, their faults, and views of the sources."""

@@ -1,0 +1,471 @@
+"""Exhaustive search for the places in a workspace where the control point P can rest.
+
+P lies ahead of the wheel axle. The source pulls P, and body k pushes P, so that the
+nearest body k gives the force F_k(p) = pull(p) + push_k(p) at a point p. P can rest in
+two cases (Filippov's convex definition):
+
+- Only body k is nearest at p, and F_k(p) = 0.
+- Several bodies are equally near, and the convex hull of their F_k(p) contains the
+  origin.
+
+The search divides the workspace into square cells. It excludes a cell if the cell
+contains no place of rest. It divides every other cell into quarters.
+
+Why the search loses no place of rest: let c be the center of a cell, r half of its
+diagonal, and d_k the distances from the bodies.
+
+- Distances change by at most r within the cell. The nearest body of any point of the
+  cell therefore satisfies d_k(c) <= min d(c) + 2 r. These bodies *count*.
+- Within the cell, F_k changes by at most ``change``. This bound is r times the
+  Lipschitz bound of pull and push, plus the error of the law's table.
+- Suppose that a unit vector u satisfies F_k(c) . u > change for every body that counts.
+  Then F_k(p) . u > 0 for all of them at every p of the cell. Hence no convex hull
+  contains the origin, and the cell is excluded.
+- If only one body counts, F_k = 0 also requires |pull| = |push_k|. The cell is excluded
+  if these magnitudes differ by more than they can change within the cell. If several
+  bodies count, this test does not apply, because two pushes can cancel each other (in
+  the middle of a corridor).
+- With ``aggregation: sum``, the same holds for the sums of the pushes of the nearest
+  three bodies.
+
+Only whole cells are excluded, and the quarters of a cell cover the cell. By induction,
+every place of rest lies in one of the remaining cells.
+
+The bound assumes that the law is convex or concave between two samples, 1 mm apart. The
+deviation of the law from the chord between two samples is then at most twice the
+deviation at the middle. The bound is the slope of the chords plus this deviation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from analysis.loops.force_field import ForceField
+from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+#: Spacing of the samples of the law, m.
+_SAMPLE_M = 1e-3
+#: Edge of the first cells, m.
+_FIRST_CELL_M = 0.25
+
+#: Points nearer to a body than this count as contact and are not searched, m. There
+#: the direction to the nearest point turns too much within a cell.
+CONTACT_M = 4e-3
+#: Number of bodies whose pushes are added with ``aggregation: sum``.
+_SLOTS = 3
+#: Number of steps towards the point of the hull that is nearest to the origin.
+_HULL_STEPS = 6
+#: Number of steps of Newton's method to a switching point.
+_NEWTON_STEPS = 25
+#: Largest number of starts of Newton's method in a group of cells.
+_MOST_STARTS = 200
+#: Distances that differ by less than this are equal, m.
+_SAME_M = 1e-9
+
+#: Smallest x, largest x, smallest y, largest y, m.
+SearchArea = tuple[float, float, float, float]
+
+
+def _unit(vectors: Floats) -> Floats:
+    size = np.linalg.norm(vectors, axis=1)
+    return vectors / np.maximum(size, 1e-300)[:, None]
+
+
+def _sampled(field: ForceField, farthest: float) -> tuple[Floats, ...]:
+    """Distances, m, law, N, and deviation of the law from its chord, N.
+
+    The deviation belongs to the interval after each distance. If the law has a corner
+    inside an interval, one end of the interval is moved to the corner.
+    """
+
+    def law(c: Floats) -> Floats:
+        # At a distance of exactly zero a push has no direction.
+        return field.law(np.maximum(c, 1e-9))
+
+    c = np.arange(0.0, farthest, _SAMPLE_M)
+    f = law(c)
+    off = law(c[:-1] + 0.5 * _SAMPLE_M) - 0.5 * (f[:-1] + f[1:])
+    size = np.abs(off)
+    around = maximum_filter1d(size, 3)
+    others = np.sort(np.stack((np.roll(size, 1), np.roll(size, -1))), axis=0)[1]
+    corners = np.flatnonzero((size == around) & (size > 4.0 * others + 1e-9))
+    moved = False
+    for k in corners[(corners > 0) & (corners < len(c) - 2)]:
+        before, after = (np.diff(f[j : j + 2])[0] / _SAMPLE_M for j in (k - 1, k + 1))
+        if before == after:
+            continue
+        at = (f[k + 1] - after * c[k + 1] - f[k] + before * c[k]) / (before - after)
+        if c[k] < at < c[k + 1]:
+            c[k if at - c[k] < 0.5 * _SAMPLE_M else k + 1], moved = at, True
+    if moved:
+        f = law(c)
+        off = law(0.5 * (c[:-1] + c[1:])) - 0.5 * (f[:-1] + f[1:])
+    # If a function is convex or concave between two samples, its deviation from the
+    # chord is at most twice the deviation at the middle.
+    return c, f, np.append(2.0 * np.abs(off), 0.0)
+
+
+@dataclass(frozen=True)
+class SwitchingPoint:
+    """Place of rest where several bodies are equally near.
+
+    Each body would give another force if it alone were the nearest. A weighted mean of
+    these forces is zero.
+    """
+
+    p_WP: Floats
+    """(2,) position of P in W, m."""
+    attractive: bool
+    """Whether all forces drive P to this point, so that P chatters near the point."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """Group of neighboring smallest cells that may contain an equilibrium."""
+
+    centres: Floats
+    """(n, 2) centers of the cells in W, m."""
+    strengths: Floats
+    """(n,) magnitude of the force at each center, N."""
+    winding: NDArray[np.int64]
+    """(n,) number of turns of the force direction along the edge of each cell. It is
+    nonzero around an isolated equilibrium."""
+    switches: Flags
+    """(n,) whether the nearest body changes within the cell."""
+
+
+class CellSearch:
+    """Bounds the force in each cell and excludes cells without equilibria."""
+
+    def __init__(self, field: ForceField) -> None:
+        scenario = field.loop.scenario
+        self.p_WS = field.p_WS
+        self._attraction = scenario.follower.attraction
+        self._bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
+        adds = scenario.follower.collision_vector.aggregation == "sum"
+        self._slots = min(_SLOTS if adds else 1, len(self._bodies))
+        farthest = field.reach_m + 1.0
+        self._c, self._f, self._error = _sampled(field, farthest)
+        self._slope = np.abs(np.diff(self._f)) / np.diff(self._c)
+        self._slope = np.append(self._slope, 0.0)
+        self._bend = np.abs(self._f) / np.maximum(self._c, _SAMPLE_M)
+
+    def left_over(
+        self, area: SearchArea, smallest_m: float
+    ) -> tuple[Floats, int, float]:
+        """Returns the cells of an area that may contain an equilibrium.
+
+        Cells whose edge is not longer than ``smallest_m`` are not divided any more. The
+        three values are the (n, 2) centers of these cells, m, the number of cells of
+        all sizes that were examined, and the edge of these cells, m.
+        """
+        edge = _FIRST_CELL_M
+        x = np.arange(area[0] + edge / 2, area[1] + edge / 2, edge)
+        y = np.arange(area[2] + edge / 2, area[3] + edge / 2, edge)
+        cells = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+        looked_at = len(cells)
+        cells = cells[~self._excluded(cells, edge)]
+        while edge > smallest_m and len(cells):
+            looked_at += 4 * len(cells)
+            cells, edge = self.quartered(cells, edge)
+        return cells, looked_at, edge
+
+    def quartered(self, cells: Floats, edge: float) -> tuple[Floats, float]:
+        """Divides cells into quarters, and returns those with a possible equilibrium.
+
+        ``cells`` are (n, 2) centers, m. The result has the (k, 2) centers and the edge
+        of these quarters, m.
+        """
+        edge /= 2.0
+        corners = edge / 2.0 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
+        cells = (cells[:, None, :] + corners).reshape(-1, 2)
+        return cells[~self._excluded(cells, edge)], edge
+
+    def outside_is_empty(self, area: SearchArea) -> bool:
+        """Whether the attraction exceeds every repulsion outside the area."""
+        x, y = self.p_WS
+        gap = min(x - area[0], area[1] - x, y - area[2], area[3] - y)
+        d_f = self._attraction.follow_distance_m
+        pull = self._attraction.stiffness_n_m * (gap - d_f)
+        corners = np.concatenate([rectangle_corners(body) for body in self._bodies])
+        (x, y), (x0, x1, y0, y1) = corners.T, area
+        nearest = float(np.min([x - x0, x1 - x, y - y0, y1 - y]))
+        if nearest <= 0.0:
+            return False
+        push = float(np.abs(self._f[self._c >= nearest - _SAMPLE_M]).max(initial=0.0))
+        return pull > push * self._slots
+
+    def forces(self, points: Floats) -> Floats:
+        """(n, 2) forces in W at points (n, 2), from the samples of the law, N."""
+        vectors, distances = self._vectors(points)
+        pushes = self._pushes(vectors, distances)
+        rank = distances.argsort(axis=0).argsort(axis=0)
+        counted = np.where((rank < self._slots)[..., None], pushes, 0.0)
+        return np.asarray(self._pull(points) + counted.sum(axis=0))
+
+    def _pull(self, points: Floats) -> Floats:
+        to_source = self.p_WS - points
+        distance = np.maximum(np.linalg.norm(to_source, axis=1), 1e-12)[:, None]
+        share = 1.0 - self._attraction.follow_distance_m / distance
+        return self._attraction.stiffness_n_m * share * to_source
+
+    def _vectors(self, points: Floats) -> tuple[Floats, Floats]:
+        """Vectors to the nearest points of bodies (k, n, 2), and lengths (k, n), m."""
+        vectors = (nearest_point_on_rectangle(points.T, body) for body in self._bodies)
+        stacked = np.array([np.stack(vector, axis=-1) for vector in vectors])
+        return stacked, np.linalg.norm(stacked, axis=-1)
+
+    def _pushes(self, vectors: Floats, distances: Floats) -> Floats:
+        force = np.interp(distances, self._c, self._f, right=0.0)
+        return -vectors * (force / np.maximum(distances, 1e-12))[..., None]
+
+    def _excluded(self, cells: Floats, edge: float) -> Flags:
+        """(n,) whether the proof above rules out an equilibrium in each cell."""
+        radius = edge * np.sqrt(0.5)
+        vectors, distances = self._vectors(cells)
+        pull, pushes = self._pull(cells), self._pushes(vectors, distances)
+        steep = self._in_cell(self._slope, distances, radius)
+        bent = np.maximum(steep, self._in_cell(self._bend, distances, radius))
+        error = self._in_cell(self._error, distances, radius)
+        own = self._pull_slope(cells, radius)
+        # counts: bodies that are among the nearest somewhere in the cell.
+        # surely: bodies that are among the nearest everywhere in the cell.
+        ordered = np.sort(distances, axis=0)
+        counts = distances <= ordered[self._slots - 1] + 2.0 * radius
+        if self._slots < len(ordered):
+            surely = distances + 2.0 * radius < ordered[self._slots]
+        else:
+            surely = counts
+        varied = np.where(counts, bent * radius + error, 0.0)
+        most = varied.max(axis=0) if self._slots == 1 else varied.sum(axis=0)
+        change = own * radius + most
+        # A margin for rounding.
+        change = change + 1e-12 * (1.0 + np.abs(pull).sum(axis=1))
+        sizes = np.abs(np.linalg.norm(pull, axis=1) - np.linalg.norm(pushes, axis=2))
+        unequal = sizes > own * radius + steep * radius + error
+        unequal = (unequal | ~counts).all(axis=0)
+        alone = (counts.sum(axis=0) == 1) & (self._slots == 1)
+        clear = self._one_sided(pull, pushes, counts & ~surely, surely, change)
+        contact = distances.min(axis=0) + radius <= CONTACT_M
+        inside = self._depth(cells) > radius
+        return np.asarray(clear | (alone & unequal) | contact | inside)
+
+    def _one_sided(
+        self,
+        pull: Floats,
+        pushes: Floats,
+        maybe: Flags,
+        surely: Flags,
+        change: Floats,
+    ) -> Flags:
+        """(n,) whether all forces of a cell exceed their change along some direction.
+
+        The change is the largest that is possible within a cell. Gilbert's method tries
+        several directions. Each is the direction of a point in the convex hull of the
+        forces. The point moves nearer to the origin at each step.
+        """
+        fixed = pull + np.where(surely[..., None], pushes, 0.0).sum(axis=0)
+        missing = self._slots - surely.sum(axis=0)
+        if not missing.any():
+            return np.asarray(np.linalg.norm(fixed, axis=1) > change)
+
+        def least(direction: Floats) -> Floats:
+            """(n, 2) force with the smallest component along a direction (n, 2)."""
+            along = np.einsum("knj,nj->kn", pushes, direction)
+            rank = np.where(maybe, along, np.inf).argsort(axis=0).argsort(axis=0)
+            chosen = maybe & (rank < missing)
+            return np.asarray(
+                fixed + np.where(chosen[..., None], pushes, 0.0).sum(axis=0)
+            )
+
+        share = missing / np.maximum(maybe.sum(axis=0), 1)
+        mean = np.where(maybe[..., None], pushes, 0.0).sum(axis=0) * share[:, None]
+        point = fixed + mean
+        clear = np.zeros(len(pull), dtype=bool)
+        for _ in range(_HULL_STEPS):
+            direction = _unit(point)
+            vertex = least(direction)
+            clear |= np.einsum("nj,nj->n", vertex, direction) > change
+            step = vertex - point
+            squared = np.maximum(np.einsum("nj,nj->n", step, step), 1e-300)
+            way = np.clip(-np.einsum("nj,nj->n", point, step) / squared, 0.0, 1.0)
+            point = point + way[:, None] * step
+        return clear
+
+    def _depth(self, points: Floats) -> Floats:
+        """(n,) depth of points inside a body, m; negative outside all bodies."""
+        depth = np.full(len(points), -np.inf)
+        for x, y, theta, length, width in self._bodies:
+            u, v = rotate(-theta, points[:, 0] - x, points[:, 1] - y)
+            own = np.minimum(length / 2.0 - np.abs(u), width / 2.0 - np.abs(v))
+            depth = np.maximum(depth, own)
+        return depth
+
+    def _pull_slope(self, cells: Floats, radius: float) -> Floats:
+        """(n,) largest slope of the attraction within each cell, N/m."""
+        distance = np.linalg.norm(self.p_WS - cells, axis=1) - radius
+        d_f = self._attraction.follow_distance_m
+        bent = np.where(distance > 0.0, d_f / np.maximum(distance, 1e-12) - 1.0, np.inf)
+        bent = bent if d_f > 0.0 else np.zeros_like(bent)
+        return self._attraction.stiffness_n_m * np.maximum(1.0, np.abs(bent))
+
+    @staticmethod
+    def _in_cell(samples: Floats, distances: Floats, radius: float) -> Floats:
+        """(k, n) largest value of a function of distance within each cell."""
+        # Samples may be moved by half their spacing.
+        window = 2 * int(np.ceil(radius / _SAMPLE_M)) + 5
+        largest = maximum_filter1d(samples, window)
+        index = np.clip((distances / _SAMPLE_M).astype(int), 0, len(largest) - 1)
+        return np.asarray(largest[index])
+
+    def groups(self, cells: Floats, edge: float) -> list[Leftover]:
+        """Divides cells, given by (n, 2) centers, m, into groups of neighbors."""
+        if not len(cells):
+            return []
+        index = np.rint((cells - cells.min(axis=0)) / edge).astype(int)
+        # The cells are few and far apart: a tree finds neighbors faster than a grid.
+        tree = cKDTree(index)
+        pairs = tree.query_pairs(1.5, p=np.inf, output_type="ndarray")
+        joined = coo_array(
+            (np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])),
+            shape=(len(cells), len(cells)),
+        )
+        count, group = connected_components(joined, directed=False)
+        order = np.argsort(group, kind="stable")
+        ends = np.cumsum(np.bincount(group, minlength=count))[:-1]
+        return [self._group(cells[part], edge) for part in np.split(order, ends)]
+
+    def _group(self, centres: Floats, edge: float) -> Leftover:
+        offsets = edge / 2.0 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        corners = (centres[:, None, :] + offsets).reshape(-1, 2)
+        forces = self.forces(corners).reshape(-1, 4, 2)
+        angles = np.arctan2(forces[..., 1], forces[..., 0])
+        steps = np.angle(np.exp(1j * (np.roll(angles, -1, axis=1) - angles)))
+        ordered = np.sort(self._vectors(centres)[1], axis=0)
+        switches = np.zeros(len(centres), dtype=bool)
+        if self._slots < len(ordered):
+            apart = ordered[self._slots] - ordered[self._slots - 1]
+            switches = apart <= np.sqrt(2.0) * edge
+        return Leftover(
+            centres=centres,
+            strengths=np.linalg.norm(self.forces(centres), axis=1),
+            winding=np.rint(steps.sum(axis=1) / (2 * np.pi)).astype(np.int64),
+            switches=switches,
+        )
+
+    def switching_points(self, group: Leftover, edge: float) -> list[SwitchingPoint]:
+        """Finds places of rest near a group where two or three bodies are equally near.
+
+        With ``aggregation: sum`` the list is empty, because the force then switches
+        between sums.
+        """
+        starts = group.centres[group.switches]
+        if not len(starts) or self._slots > 1:
+            return []
+        starts = starts[:: -(-len(starts) // _MOST_STARTS)]
+        nearest = np.argsort(self._vectors(starts)[1], axis=0)
+        found: list[SwitchingPoint] = []
+        for size in (2, 3)[: len(self._bodies) - 1]:
+            ends = self._newton(starts, nearest[:size])
+            for begin, end, bodies in zip(starts, ends, nearest[:size].T, strict=True):
+                near = np.abs(end - begin).max() <= 2.0 * edge
+                known = any(np.linalg.norm(end - s.p_WP) < 1e-6 for s in found)
+                if near and not known and self._cancels(end, bodies):
+                    found.append(SwitchingPoint(end, self._attracts(end, bodies)))
+        return found
+
+    def _each(self, points: Floats, bodies: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """Distances (size, n) of bodies (size, n), m, and forces (size, n, 2), N."""
+        vectors, distances = self._vectors(points)
+        row = np.arange(points.shape[0])
+        forces = self._pull(points) + self._pushes(vectors, distances)
+        return distances[bodies, row], forces[bodies, row]
+
+    def _newton(self, starts: Floats, bodies: NDArray[np.int64]) -> Floats:
+        """(n, 2) points where bodies are equally near, m, and two forces parallel."""
+
+        def residual(points: Floats) -> Floats:
+            distances, forces = self._each(points, bodies)
+            first = distances[0] - distances[1]
+            if len(bodies) == 3:
+                return np.stack((first, distances[0] - distances[2]), axis=-1)
+            (ax, ay), (bx, by) = forces[0].T, forces[1].T
+            scale = np.maximum(np.linalg.norm(forces, axis=2).max(axis=0), 1e-12)
+            return np.stack((first, (ax * by - ay * bx) / scale), axis=-1)
+
+        p, step = starts.copy(), 1e-7
+        for _ in range(_NEWTON_STEPS):
+            value = residual(p)
+            slopes = np.stack(
+                [
+                    (residual(p + step * e) - residual(p - step * e)) / (2.0 * step)
+                    for e in np.eye(2)
+                ],
+                axis=-1,
+            )
+            move = -np.einsum("nij,nj->ni", np.linalg.pinv(slopes, rcond=1e-9), value)
+            size = np.linalg.norm(move, axis=1, keepdims=True)
+            p = p + move * np.minimum(1.0, 0.01 / np.maximum(size, 1e-300))
+        return p
+
+    def _cancels(self, p: Floats, bodies: NDArray[np.int64]) -> bool:
+        """Whether the bodies are the nearest at p and the hull contains the origin."""
+        distances, forces = self._each(p[None], bodies[:, None])
+        least = self._vectors(p[None])[1].min()
+        if np.ptp(distances) > _SAME_M or abs(distances[0, 0] - least) > _SAME_M:
+            return False
+        F = forces[:, 0]
+        tiny = 1e-6 * np.linalg.norm(F, axis=1).max()
+        if least <= CONTACT_M or tiny == 0.0:
+            return False
+        if len(F) == 2:
+            across = abs(F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
+            return bool(F[0] @ F[1] < 0.0 and across <= tiny * np.linalg.norm(F[0]))
+        turns = [np.linalg.det(np.array([F[k], F[(k + 1) % 3]])) for k in range(3)]
+        return bool(min(turns) > 0.0 or max(turns) < 0.0)
+
+    def _attracts(self, p: Floats, bodies: NDArray[np.int64]) -> bool:
+        """Whether the forces drive the control point P to a switching point.
+
+        The nearest body alone pushes P. The force is then that of a potential: the
+        potential of the pull plus Phi(smallest distance). If the bodies push, the
+        directional derivative of the potential at p along u is the largest -F_k . u.
+        This derivative is not negative, because the hull contains the origin. The
+        derivative can be zero only along the line on which two bodies stay equally
+        near. Along this line the force must lead back to p.
+        """
+        distances, _ = self._each(p[None], bodies[:, None])
+        if np.interp(distances[0, 0], self._c, self._f, right=0.0) <= 0.0:
+            return False
+        if len(bodies) == 3:
+            return True
+        away = -self._vectors(p[None])[0][bodies, 0]
+        away /= np.linalg.norm(away, axis=1, keepdims=True)
+        normal = _unit((away[0] - away[1])[None])[0]
+        along = np.array([-normal[1], normal[0]])
+        ahead, behind = (
+            self._sliding(p + sign * 1e-4 * along, bodies) @ along for sign in (1, -1)
+        )
+        return bool(ahead - behind < 1e-9)
+
+    def _sliding(self, p: Floats, bodies: NDArray[np.int64]) -> Floats:
+        """(2,) mean of two forces that keeps P equally near to their bodies, N."""
+        vectors, distances = (x[bodies, 0] for x in self._vectors(p[None]))
+        away = -vectors / distances[:, None]
+        normal = away[0] - away[1]
+        # Move p back to the line on which the distances are equal.
+        p = p - normal * (distances[0] - distances[1]) / (normal @ normal)
+        forces = self._each(p[None], bodies[:, None])[1][:, 0]
+        across = forces @ normal
+        share = across[1] / (across[1] - across[0])
+        return np.asarray(share * forces[0] + (1.0 - share) * forces[1])

@@ -1,0 +1,327 @@
+"""Stability margins of a loop: gain, phase, modulus, disk and delay margins.
+
+The matrices of the loop give the crossovers and peaks (``frequency_levels``), in
+continuous and in sampled time. Therefore no crossover or peak is missed between two
+points of a frequency grid or outside the grid. Gain and phase margins are two-sided,
+because a loop with an unstable plant also becomes unstable if its gain is too low.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.loops.frequency_levels import (
+    GRID_POINTS,
+    SEARCH_POINTS,
+    crossings,
+    frequency_grid,
+    level_frequencies,
+    peak,
+    with_middles,
+)
+from analysis.loops.linear_models import LinearModel
+from analysis.loops.open_loops import (
+    BREAK_POINTS,
+    DIRECTIONS,
+    BreakPoint,
+    Direction,
+    open_loop,
+)
+from analysis.loops.operating_points import OperatingPoint
+from systems.framework.input_error import InputError
+
+#: Skews of the disk margins, for gain reduction (-1), for reduction and increase alike
+#: (0), and for gain increase (1).
+SKEWS = (-1.0, 0.0, 1.0)
+#: If |L| is below this at all frequencies, there is no loop.
+_NO_LOOP = 1e-9
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """Frequency response of a loop."""
+
+    omega: NDArray[np.float64]
+    """(n,) rad/s."""
+    L: NDArray[np.complex128]
+    """(n,)"""
+
+
+@dataclass(frozen=True)
+class DiskMargin:
+    """Disk margin: largest disk of gain and phase changes that keeps the loop stable.
+
+    The loop stays stable if L is multiplied by any factor
+
+        (1 + (1 - skew)/2 d) / (1 - (1 + skew)/2 d)
+
+    with a complex |d| < alpha (Seiler, Packard and Gahinet 2020).
+    """
+
+    skew: float
+    """Skew of the disk. With 0, gain increase and gain reduction count alike."""
+    alpha: float
+    """Size of the disk. If the closed loop is unstable: 0."""
+    frequency_rad_s: float
+    """Frequency at which the loop is nearest to the disk, rad/s."""
+
+    def to_dict(self) -> dict[str, float]:
+        """Values for the JSON document."""
+        names = (
+            "skew", "alpha", "gain_low", "gain_high", "gain_margin_db",
+            "phase_margin_deg", "frequency_rad_s",
+        )  # fmt: skip
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def gain_low(self) -> float:
+        """Smallest permitted gain factor; 0 if the gain may vanish."""
+        return max(0.0, self._ends[0])
+
+    @property
+    def gain_high(self) -> float:
+        """Largest permitted gain factor; infinite without a limit."""
+        return self._ends[1]
+
+    @property
+    def gain_margin_db(self) -> float:
+        """Permitted change of the gain in either direction, dB."""
+        return _least_db(self.gain_low, self.gain_high)
+
+    @property
+    def phase_margin_deg(self) -> float:
+        """Permitted change of the phase in either direction, deg."""
+        # Phase at which the circle |d| = alpha gives the factor exp(j phase).
+        if self.alpha == math.inf:
+            return math.inf
+        squared = self.alpha**2
+        cosine = 4.0 - squared * (1.0 + self.skew**2)
+        cosine /= 4.0 + squared * (1.0 - self.skew**2)
+        return math.degrees(math.acos(cosine)) if cosine > -1.0 else math.inf
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        """Gain factors at which the disk meets the real axis: smallest and largest."""
+        if self.alpha == math.inf:
+            return -math.inf, math.inf
+        less, more = self.alpha * (1.0 - self.skew), self.alpha * (1.0 + self.skew)
+        high = (2.0 + less) / (2.0 - more) if more < 2.0 else math.inf
+        return (2.0 - less) / (2.0 + more), high
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """Stability margins of a loop; the defaults are those of an unstable loop."""
+
+    name: str
+    model: LinearModel = field(repr=False)
+    """Loop transfer function L."""
+    stable: bool = False
+    gain_increase_margin: float = 1.0
+    """Gain factor above 1 at which the loop becomes unstable; infinite if none does."""
+    gain_reduction_margin: float = 1.0
+    """Gain factor below 1 at which the loop becomes unstable; 0 if none does."""
+    phase_lag_margin_deg: float = 0.0
+    """Smallest destabilizing phase lag at a gain crossover, deg; infinite if none."""
+    phase_lead_margin_deg: float = 0.0
+    """Smallest destabilizing phase lead at a gain crossover, deg; infinite if none."""
+    crossover_rad_s: float = math.nan
+    """Gain crossover of the phase margin, rad/s. Without a crossover: NaN."""
+    delay_margin_s: float = 0.0
+    """Delay margin, s: smallest ratio of phase lag margin, rad, to frequency, rad/s,
+    over all gain crossovers. The value is exact in continuous time. For sampled loops
+    see ``analysis.loops.delay_margin``."""
+    modulus_margin: float = 0.0
+    """Smallest distance of L from -1."""
+    modulus_frequency_rad_s: float = math.nan
+    sensitivity_peak: float = math.inf
+    """Largest |S| (M_s)."""
+    complementary_peak: float = math.inf
+    """Largest |T| (M_t)."""
+    disks: tuple[DiskMargin, ...] = tuple(
+        DiskMargin(skew, 0.0, math.nan) for skew in SKEWS
+    )
+    """One disk margin for each of ``SKEWS``."""
+
+    @cached_property
+    def response(self) -> FrequencyResponse:
+        """Frequency response for figures."""
+        return frequency_response(self.model)
+
+    @property
+    def gain_increase_margin_db(self) -> float:
+        """Gain increase at which the loop becomes unstable, dB."""
+        return _least_db(0.0, self.gain_increase_margin)
+
+    @property
+    def gain_reduction_margin_db(self) -> float:
+        """Gain reduction at which the loop becomes unstable, dB; positive."""
+        return _least_db(self.gain_reduction_margin, math.inf)
+
+    @property
+    def gain_margin_db(self) -> float:
+        """Smallest destabilizing change of the gain, up or down, dB."""
+        return _least_db(self.gain_reduction_margin, self.gain_increase_margin)
+
+    @property
+    def phase_margin_deg(self) -> float:
+        """Smallest destabilizing change of the phase, lag or lead, deg."""
+        return min(self.phase_lag_margin_deg, self.phase_lead_margin_deg)
+
+    @property
+    def disk(self) -> DiskMargin:
+        """Disk margin with skew 0."""
+        return next(disk for disk in self.disks if disk.skew == 0.0)
+
+
+def _least_db(low: float, high: float) -> float:
+    """Smaller distance from 1 to either end of an interval of gain factors, dB."""
+    down = 20.0 * math.log10(1.0 / low) if low > 0.0 else math.inf
+    return min(down, 20.0 * math.log10(high))
+
+
+def frequency_response(model: LinearModel) -> FrequencyResponse:
+    """Returns the response at all modes of the open and the closed loop."""
+    omega = _grid(model, GRID_POINTS)
+    return FrequencyResponse(omega, model.response(omega)[0, 0])
+
+
+def _grid(model: LinearModel, points: int) -> NDArray[np.float64]:
+    """(n,) frequencies, rad/s, that show the modes of the open and the closed loop."""
+    poles = np.concatenate((model.poles, _complementary(model).poles))
+    return frequency_grid(poles, model.period_s, points=points)
+
+
+def is_loop(model: LinearModel) -> bool:
+    """Whether any signal comes back: |L| is more than rounding errors."""
+    omega = _grid(model, SEARCH_POINTS)
+    return bool(np.abs(model.response(omega)[0, 0]).max() > _NO_LOOP)
+
+
+def loop_margins(model: LinearModel) -> LoopMargins:
+    """Computes all margins of a loop L with one input and output, negative feedback."""
+    if model.B.shape[1] != 1 or model.C.shape[0] != 1:
+        raise InputError(
+            f"{model.name}",
+            f"has {model.B.shape[1]} inputs and {model.C.shape[0]} outputs; margins "
+            "need exactly one loop; select one with LinearModel.part",
+        )
+    T = _complementary(model)
+    if not T.stable:
+        return LoopMargins(model.name, model)
+    omega = _grid(model, SEARCH_POINTS)
+    upper, lower = _gain_margins(model, T, omega)
+    lag, lead, crossover, delay = _phase_margins(model, T, omega)
+    # S = 1 - T, and the disk of a skew is the smallest 1/|S + (skew - 1)/2|.
+    peaks = [peak(T, (1.0 + skew) / 2.0) for skew in SKEWS]
+    disks = tuple(
+        DiskMargin(skew, 1.0 / largest if largest > 0.0 else math.inf, where)
+        for skew, (largest, where) in zip(SKEWS, peaks, strict=True)
+    )
+    largest_T, (largest_S, where) = peaks[0][0], peaks[-1]
+    return LoopMargins(
+        name=model.name,
+        model=model,
+        stable=True,
+        gain_increase_margin=upper,
+        gain_reduction_margin=lower,
+        phase_lag_margin_deg=math.degrees(lag),
+        phase_lead_margin_deg=math.degrees(lead),
+        crossover_rad_s=crossover,
+        delay_margin_s=delay,
+        modulus_margin=1.0 / largest_S,
+        modulus_frequency_rad_s=where,
+        sensitivity_peak=largest_S,
+        complementary_peak=largest_T,
+        disks=disks,
+    )
+
+
+def _complementary(model: LinearModel) -> LinearModel:
+    """T = L/(1 + L). If the loop is stable, T has no poles on the stability border."""
+    share = 1.0 / (1.0 + model.D[0, 0])
+    return replace(
+        model,
+        A=model.A - model.B @ model.C * share,
+        B=share * model.B,
+        C=share * model.C,
+        D=share * model.D,
+    )
+
+
+def _gain_margins(
+    model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Smallest gain above 1 and largest below 1 that put a pole on the border."""
+    # L is real where T is.
+    found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, -1j, 0.0))))
+    at = crossings(found, lambda w: model.response(w)[0, 0].imag)
+    values = list(model.response(at)[0, 0].real) if at else []
+    # L is also real at both ends of the border. An integrating loop has T = 1 at zero
+    # frequency, where L is infinite: no gain above 0 is too small.
+    ends = [0.0, math.pi / T.period_s] if T.period_s else [0.0]
+    values += [
+        t / (1.0 - t) for t in T.response(ends)[0, 0].real if abs(1.0 - t) > _NO_LOOP
+    ]
+    values += [] if T.period_s else [float(model.D[0, 0])]
+    upper, lower = math.inf, 0.0
+    for value in values:
+        if value < -_NO_LOOP:
+            gain = -1.0 / value
+            if gain >= 1.0:
+                upper = min(upper, gain)
+            elif gain > _NO_LOOP:
+                lower = max(lower, gain)
+    return upper, lower
+
+
+def _phase_margins(
+    model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
+) -> tuple[float, float, float, float]:
+    """Smallest lag and lead, rad, frequency of the smaller, rad/s, and delay, s."""
+    # |L| = 1 where the real part of T is 1/2.
+    found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))
+    at = crossings(found, lambda w: np.abs(model.response(w)[0, 0]) - 1.0)
+    lag, lead, where, delay = math.inf, math.inf, math.nan, math.inf
+    for w, L in zip(at, model.response(at)[0, 0] if at else (), strict=True):
+        behind = float(np.angle(-L)) % math.tau  # lag that turns L to -1
+        ahead = math.tau - behind
+        if min(behind, ahead) < min(lag, lead):
+            where = w
+        lag, lead = min(lag, behind), min(lead, ahead)
+        delay = min(delay, behind / w)
+    if not model.period_s and abs(model.D[0, 0]) >= 1.0:
+        # There are crossovers at arbitrarily high frequencies: any delay destabilizes.
+        delay = 0.0
+    return lag, lead, where, delay
+
+
+@dataclass(frozen=True)
+class PointMargins:
+    """Margins of one cut loop at an operating point."""
+
+    at: BreakPoint
+    direction: Direction
+    margins: LoopMargins
+    """The loop of the other direction is closed."""
+
+
+def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:
+    """Computes the stability margins with the loop cut at sensor, actuator and wheels.
+
+    Each cut gives two loops: along the line to the source, and across this line. Loops
+    that do not exist are left out. For example, without repulsion no force acts across
+    the line at the follow distance.
+    """
+    found = []
+    for at in BREAK_POINTS:
+        for direction in DIRECTIONS:
+            model = open_loop(point, at, direction)
+            if is_loop(model):
+                found.append(PointMargins(at, direction, loop_margins(model)))
+    return tuple(found)

@@ -1,1 +1,0 @@
-"""Equations of the control loop: operating points, linear models, point mass."""

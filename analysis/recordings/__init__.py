@@ -1,1 +1,0 @@
-"""Locates sounds in the recordings of microphone arrays."""

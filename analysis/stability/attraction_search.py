@@ -1,0 +1,503 @@
+"""Search for an attraction that meets the requirements, for several stiffnesses K_r.
+
+The attraction is the virtual spring (stiffness K_r) and damper (damping D_r) that pull
+the robot to the follow point. The follow point has a given distance, the follow
+distance, from the source. The search has these steps:
+
+1. For each of several K_r, find the least D_r with which the loop to the follow point
+   has the required margins, and with which the motion in front of an obstacle (the
+   contact mode) is stable. The loop has sampling and motor lag, but no force of the
+   law.
+2. If the current K_r and D_r meet these requirements, keep them. Otherwise, take the
+   current K_r if possible, or else the K_r with the least lag.
+3. If the overshoot needs a longer follow distance than the current one, take this
+   distance.
+4. If the gains of the scenario's law miss a requirement, choose new gains. Increase the
+   follow distance until the push away from the leader shifts the robot little enough.
+   The leader is the robot that carries the source.
+5. If the new gains of the law need more damping in front of an obstacle, start again
+   with these gains.
+
+The law also pushes the robot away from the leader's body. ``WholeLoop`` has the margins
+of the loop with this push.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from analysis.loops.contact_mode import (
+    contact_model,
+    largest_contact_stiffness,
+    motion_chain,
+)
+from analysis.loops.equilibria import follow_equilibrium
+from analysis.loops.ideal_scenarios import changed, ideal_scenario
+from analysis.loops.linear_models import LinearModel
+from analysis.loops.loop_margins import LoopMargins, all_margins, loop_margins
+from analysis.loops.open_loops import BreakPoint
+from analysis.loops.push_and_pull import DESIGNED_LAWS
+from analysis.loops.radial_law import radial_law
+from analysis.stability.gain_search import search_gains
+from analysis.stability.requirements import (
+    Check,
+    LawDesign,
+    Requirement,
+    Requirements,
+    check_law,
+)
+from diagrams import library_scenarios
+from diagrams.running.simulation import simulate
+from diagrams.scenario.participants import LawGains
+from diagrams.scenario.scenario import Scenario
+from systems.framework.input_error import InputError
+from systems.laws.parameters import AttractionParameters
+
+#: Values of K_r that are tried, as multiples of the current K_r.
+_SPRINGS = (0.5, 1.0, 2.0, 4.0)
+#: Values of D_r that are tried, as multiples of critical damping.
+_DAMPERS = np.geomspace(0.05, 3.0, 30)
+#: Places where the loop is cut.
+_CUTS: tuple[BreakPoint, ...] = ("sensor", "actuator")
+#: Largest number of searches with new gains of the law. The second usually suffices.
+_ROUNDS = 4
+#: The follow distance is rounded up to a multiple of this step, m.
+_STEP_M = 0.05
+#: The first number is the distance of a source so far away that P reaches top speed,
+#: m.
+#: The second number is a follow distance so large that P stops in front of the
+#: source, m.
+_APPROACH_M, _STAND_OFF_M = 8.0, 3.0
+
+
+@dataclass(frozen=True)
+class GainFigures:
+    """Performance figures of one pair of gains K_r and D_r.
+
+    Each margin, and the sensitivity peak M_s, is the worse of those at the sensor and
+    at the actuator.
+    """
+
+    stiffness_n_m: float
+    """K_r, N/m."""
+    damping_n_s_m: float
+    """D_r, N s/m."""
+    damping_ratio: float
+    phase_margin_deg: float
+    gain_margin_db: float
+    sensitivity_peak: float
+    disk_margin: float
+    delay_margin_s: float
+    """Phase margin divided by crossover frequency, s."""
+    contact_radius: float
+    """Spectral radius of the motion in front of an obstacle; stable below 1."""
+    following_lag_m: float
+    """Lag of the robot behind the follow point of the moving source, m."""
+    settling_s: float
+    """Time in which a small deviation falls to 2 %, s."""
+    largest_law_stiffness_n_m: float
+    """Largest stiffness of a law with which the contact mode is stable, N/m."""
+
+
+@dataclass(frozen=True)
+class GainChoice:
+    """The least damping that meets the requirements for one K_r."""
+
+    stiffness_n_m: float
+    """K_r, N/m."""
+    figures: GainFigures | None
+    """Performance figures. None if no damping meets the requirements with this K_r."""
+
+
+@dataclass(frozen=True)
+class WholeLoop:
+    """Least margins at rest of the loop that includes the law, over all cuts.
+
+    Gain may rise or fall, and phase may lag or lead.
+    """
+
+    gain_margin_db: float
+    phase_margin_deg: float
+    disk_margin: float
+    weakest: str
+    """Name of the cut loop with the least disk margin."""
+
+    def meets(self, requirements: Requirements) -> bool:
+        """Returns whether all three margins meet the requirements."""
+        limits = dict(requirements.loop())
+        fields = ("gain_margin_db", "phase_margin_deg", "disk_margin")
+        return all(limits[field].check(getattr(self, field)).met for field in fields)
+
+
+@dataclass(frozen=True)
+class RecommendedGains:
+    """The current gains, the least D_r for several K_r, and the recommended gains."""
+
+    requirements: Requirements
+    scenario: Scenario
+    """Scenario with the current gains."""
+    today: GainFigures
+    choices: tuple[GainChoice, ...]
+    """The least D_r for several K_r, with the current gains of the law."""
+    chosen: Scenario | None
+    """Scenario with the recommended K_r, D_r, follow distance, and gains of its law.
+    None if no gains meet the requirements."""
+    recommended: GainFigures | None
+    law: LawDesign | None
+    """Gains of the law. None if the design chooses no gains of this law."""
+    whole_loop: WholeLoop | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the figures and the recommended gains for the JSON document."""
+        return {
+            "requirements": self.requirements,
+            "law": self.scenario.only.law,
+            "today": self.today,
+            "choices": self.choices,
+            "recommended": self.recommended,
+            "settings": self.settings,
+            "law_checks": self.law.checks if self.law else (),
+            "whole_loop": self.whole_loop,
+        }
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Recommended values of the fields of the scenario that change, by field."""
+        if self.chosen is None:
+            return {}
+        now, then = self.scenario.follower, self.chosen.follower
+        groups: list[tuple[str, Any, Any]] = [
+            ("attraction", now.attraction, then.attraction)
+        ]
+        if self.law is not None:
+            name = self.law.law
+            old, new = getattr(now.laws, name), getattr(then.laws, name)
+            groups.append((f"laws.{name}", old, new))
+        return {
+            f"{group}.{field}": value
+            for group, old, new in groups
+            for field, value in new.model_dump().items()
+            if value != getattr(old, field)
+        }
+
+    @property
+    def command(self) -> str:
+        """Command line that simulates the recommended gains; empty without any."""
+        if self.chosen is None:
+            return ""
+        name = self.scenario.name
+        words = [
+            "phonotaxis simulate",
+            name if name in library_scenarios() else "scenario.yaml",
+            f"--law {self.scenario.only.law}",
+            *(f"--set {field}={value:g}" for field, value in self.settings.items()),
+        ]
+        return " ".join(words)
+
+    @property
+    def advice(self) -> str:
+        """The recommendation and its cost, in words."""
+        today, best = self.today, self.recommended
+        if best is None:
+            return (
+                "No gains meet all requirements: the law is too stiff before an "
+                "obstacle, or the motors are too slow. Lower the law's stiffness "
+                "first."
+            )
+        if not self.settings:
+            return f"The current gains meet all requirements.{self._of_the_law}"
+        return (
+            f"Recommended: `{self.command}`. With these gains, P stays "
+            f"{best.following_lag_m:.2f} m instead of {today.following_lag_m:.2f} m "
+            "behind the follow point of the moving source. P settles to 2 % in "
+            f"{best.settling_s:.1f} s instead of {today.settling_s:.1f} s, and a law "
+            f"may be as stiff as {best.largest_law_stiffness_n_m:.0f} N/m instead of "
+            f"{today.largest_law_stiffness_n_m:.0f} N/m before an obstacle. A larger "
+            "K_r with a larger D_r has less lag and leaves less delay "
+            f"margin.{self._unmet}{self._of_the_law}"
+        )
+
+    @property
+    def _unmet(self) -> str:
+        """Sentence about the requirements that the law cannot meet."""
+        checks = self.law.checks if self.law else ()
+        unmet = [check.name for check in checks if not check.acceptable]
+        if not unmet:
+            return ""
+        return f" The law does not meet these requirements: {', '.join(unmet)}."
+
+    @property
+    def _of_the_law(self) -> str:
+        """Sentences about the margins with the law, if these margins are too small."""
+        whole = self.whole_loop
+        if whole is None or whole.meets(self.requirements):
+            return ""
+        return (
+            " These numbers are for the attraction's loop alone. If the loop includes "
+            "the law's push off the source's body, the same gains leave a gain margin "
+            f"of {whole.gain_margin_db:.2f} dB and {whole.phase_margin_deg:.1f} deg "
+            f"of phase (weakest: {whole.weakest})."
+        )
+
+
+def recommend_gains(
+    scenario: Scenario,
+    requirements: Requirements | None = None,
+    *,
+    springs: Sequence[float] = _SPRINGS,
+) -> RecommendedGains:
+    """Finds gains of the attraction and of the law that meet the requirements.
+
+    ``springs`` are the values of K_r to try, as multiples of the current K_r. Raises
+    InputError if the current K_r is 0, or if no gains of the law meet a requirement
+    that must be met.
+    """
+    requirements = requirements or Requirements()
+    K_r = scenario.follower.attraction.stiffness_n_m
+    if K_r == 0.0:
+        raise InputError(
+            "attraction.stiffness_n_m",
+            "is 0, so that there is no loop to recommend gains for; set it above 0",
+        )
+    today = gain_figures(scenario, requirements)
+    choices = tuple(
+        least_damping(scenario, share * K_r, requirements) for share in springs
+    )
+    fits = all(check.met for check in _checks(scenario, requirements))
+    best = today if fits else _best(choices, K_r)
+    chosen, law = _chosen(scenario, best, requirements), scenario.only.law
+    return RecommendedGains(
+        requirements=requirements,
+        scenario=scenario,
+        today=today,
+        choices=choices,
+        chosen=chosen,
+        recommended=gain_figures(chosen, requirements) if chosen else None,
+        law=check_law(chosen, law, requirements)
+        if chosen and law in DESIGNED_LAWS
+        else None,
+        whole_loop=_whole_loop(chosen) if chosen else None,
+    )
+
+
+def _best(choices: Sequence[GainChoice], K_r: float) -> GainFigures | None:
+    found = [choice.figures for choice in choices if choice.figures]
+    same = [f for f in found if f.stiffness_n_m == K_r]
+    return min(same or found, key=lambda f: f.following_lag_m, default=None)
+
+
+def _chosen(
+    scenario: Scenario, best: GainFigures | None, requirements: Requirements
+) -> Scenario | None:
+    """The scenario with K_r, D_r, follow distance and gains of its law, or None."""
+    for _ in range(_ROUNDS):
+        if best is None:
+            return None
+        scenario = with_attraction(scenario, best.stiffness_n_m, best.damping_n_s_m)
+        scenario = with_follow_distance(scenario, requirements)
+        if _contact(scenario, requirements).stable:
+            return scenario
+        best = least_damping(scenario, best.stiffness_n_m, requirements).figures
+    return None
+
+
+def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scenario:
+    """Chooses the follow distance, and the gains of the scenario's law with it.
+
+    The follow distance is at least the current one, leaves room for the overshoot, and
+    is so long that the law shifts P at rest little enough.
+    """
+    law = scenario.only.law
+    least = follow_distance(scenario, requirements, braking_overshoot(scenario))
+    follow = max(least, scenario.follower.attraction.follow_distance_m)
+    while True:
+        attraction = scenario.follower.attraction.model_copy(
+            update={"follow_distance_m": round(follow, 2)}
+        )
+        scenario = scenario.with_robot(attraction=attraction)
+        if law not in DESIGNED_LAWS:
+            return scenario
+        scenario = scenario.with_robot(laws=fitting_gains(scenario, requirements, law))
+        offset = check_law(scenario, law, requirements).check(
+            "offset behind the source"
+        )
+        if offset.acceptable or not DESIGNED_LAWS[law].sets_follow_distance:
+            return scenario
+        follow += _STEP_M
+
+
+def fitting_gains(
+    scenario: Scenario, requirements: Requirements, *laws: str
+) -> LawGains:
+    """Returns the gains of a scenario, new for laws that miss a requirement."""
+    unfit = [x for x in laws if not check_law(scenario, x, requirements).acceptable]
+    return search_gains(scenario, requirements, laws=unfit)
+
+
+def _whole_loop(chosen: Scenario) -> WholeLoop:
+    loops = [found.margins for found in all_margins(follow_equilibrium(chosen))]
+    weakest = min(loops, key=lambda loop: loop.disk.alpha)
+    return WholeLoop(
+        gain_margin_db=min(loop.gain_margin_db for loop in loops),
+        phase_margin_deg=min(loop.phase_margin_deg for loop in loops),
+        disk_margin=float(weakest.disk.alpha),
+        weakest=weakest.name,
+    )
+
+
+def least_damping(
+    scenario: Scenario, K_r: float, requirements: Requirements
+) -> GainChoice:
+    """Finds the least D_r, up to three times critical, that meets the requirements."""
+    critical = 2.0 * math.sqrt(K_r * scenario.only.robot.mass_kg)
+
+    def meets(D_r: float) -> bool:
+        checks = _checks(with_attraction(scenario, K_r, D_r), requirements)
+        return all(check.met for check in checks)
+
+    below = 0.0
+    for D_r in critical * _DAMPERS:
+        if meets(D_r):
+            least = _bisected(meets, below, float(D_r))
+            chosen = with_attraction(scenario, K_r, least)
+            return GainChoice(K_r, gain_figures(chosen, requirements))
+        below = float(D_r)
+    return GainChoice(K_r, None)
+
+
+def _bisected(meets: Callable[[float], bool], low: float, high: float) -> float:
+    """Least value that meets the requirements, if possible rounded up to 2 decimals."""
+    while high - low > 1e-3 * high:
+        middle = (low + high) / 2.0
+        low, high = (low, middle) if meets(middle) else (middle, high)
+    rounded = math.ceil(100.0 * high) / 100.0
+    return rounded if meets(rounded) else high
+
+
+def _checks(scenario: Scenario, requirements: Requirements) -> Iterator[Check]:
+    """Checks of K_r and D_r, the quickest first."""
+    limits = dict(requirements.loop())
+    K_r = scenario.follower.attraction.stiffness_n_m
+    ratio = contact_model(scenario, K_r).damping_ratio
+    yield limits.pop("damping_ratio").check(ratio)
+    growth = _contact(scenario, requirements).growth_per_s
+    yield Requirement("growth at an obstacle", 0.0, "1/s").check(growth)
+    for at in _CUTS:
+        margins = _margins(loop_margins(attraction_loop(scenario, at)))
+        for field, requirement in limits.items():
+            yield requirement.check(margins[field])
+
+
+def _margins(loop: LoopMargins) -> dict[str, float]:
+    fields = (
+        "phase_margin_deg",
+        "gain_margin_db",
+        "delay_margin_s",
+        "sensitivity_peak",
+    )
+    return {name: getattr(loop, name) for name in fields} | {
+        "disk_margin": loop.disk.alpha
+    }
+
+
+def _contact(scenario: Scenario, requirements: Requirements) -> LinearModel:
+    """Motion in front of an obstacle where the law is stiffest, with late echoes."""
+    total = scenario.follower.attraction.stiffness_n_m
+    total += radial_law(scenario).stiffest_n_m
+    late = requirements.spare_latency_ticks
+    return contact_model(scenario, total, latency_ticks=late)
+
+
+def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
+    """Returns the sampled open loop of the attraction without the force of the law.
+
+    The attraction consists of a spring and a damper. The robot moves along the line to
+    a source at rest. A cut at ``sensor`` opens the path of the spring only. A cut at
+    ``actuator`` opens the paths of both the spring and the damper. The input and the
+    output are accelerations, m/s^2.
+    """
+    chain = motion_chain(scenario)
+    mass = scenario.only.robot.mass_kg
+    spring = scenario.follower.attraction.stiffness_n_m / mass * chain.C[:1]
+    damper = scenario.follower.attraction.damping_n_s_m / mass * chain.C[1:]
+    inner = chain.B @ damper if at == "sensor" else np.zeros_like(chain.A)
+    return replace(
+        chain,
+        name=f"L of the attraction, at the {at}",
+        A=chain.A - inner,
+        C=spring if at == "sensor" else spring + damper,
+        D=np.zeros((1, 1)),
+        output_names=("acceleration",),
+    )
+
+
+def gain_figures(scenario: Scenario, requirements: Requirements) -> GainFigures:
+    """Computes performance figures of the stiffness K_r and damping D_r of a scenario.
+
+    Of the requirements, only ``spare_latency_ticks`` is used.
+    """
+    both = [_margins(loop_margins(attraction_loop(scenario, at))) for at in _CUTS]
+    worst = {
+        field: (max if field == "sensitivity_peak" else min)(m[field] for m in both)
+        for field in both[0]
+    }
+    attraction = scenario.follower.attraction
+    K_r, D_r = attraction.stiffness_n_m, attraction.damping_n_s_m
+    motion = contact_model(scenario, K_r)
+    return GainFigures(
+        stiffness_n_m=K_r,
+        damping_n_s_m=D_r,
+        damping_ratio=motion.damping_ratio,
+        contact_radius=_contact(scenario, requirements).spectral_radius,
+        following_lag_m=D_r / K_r * scenario.source.speed_m_s,
+        settling_s=motion.settling_s,
+        largest_law_stiffness_n_m=largest_contact_stiffness(scenario) - K_r,
+        **worst,
+    )
+
+
+def braking_overshoot(scenario: Scenario) -> float:
+    """Simulates a braking robot and returns its overshoot past the follow point, m.
+
+    The source is at rest, and the robot approaches at top speed. The simulation has
+    exact hearing, no obstacle, and no law. If the robot does not overshoot, the result
+    is 0.
+    """
+    changes = {
+        "law": "none",
+        "duration_s": 15.0,
+        "obstacles": (),
+        "start": {"position_m": [0.0, 0.0], "heading_deg": 0.0},
+        "attraction": {"follow_distance_m": _STAND_OFF_M},
+        "source": {"waypoints_m": [[_APPROACH_M, 0.0]]},
+    }
+    run = simulate(changed(ideal_scenario(scenario), changes))
+    return max(0.0, _STAND_OFF_M - float(run.columns["source_range_true"].min()))
+
+
+def follow_distance(
+    scenario: Scenario, requirements: Requirements, overshoot_m: float
+) -> float:
+    """Returns the least follow distance that leaves room for an overshoot, m.
+
+    This is the distance from the follower's control point to the source, rounded up to
+    a multiple of 5 cm. The follower passes the follow point by ``overshoot_m`` and
+    keeps the clearance to the body of the leader, which carries the source.
+    """
+    room = scenario.source.length_m / 2.0 + requirements.clearance_m
+    least = overshoot_m + room
+    return round(math.ceil(least / _STEP_M - 1e-9) * _STEP_M, 2)
+
+
+def with_attraction(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
+    """Returns a copy of a scenario with other gains K_r, N/m, and D_r, N s/m."""
+    attraction = AttractionParameters.model_validate(
+        scenario.follower.attraction.model_dump()
+        | {"stiffness_n_m": K_r, "damping_n_s_m": D_r}
+    )
+    return scenario.with_robot(attraction=attraction)
