@@ -165,7 +165,7 @@ def _run(part: Part[Any], study: Study, analysis: LawAnalysis) -> Section:
     try:
         data = part.compute(study)
         section = part.section(data)
-        analysis.loops.extend(part.models(data))
+        analysis.models.extend(part.models(data))
         analysis.notes.extend(part.notes(data))
     except InputError as error:
         if not analysis.sections:

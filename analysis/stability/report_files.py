@@ -108,7 +108,7 @@ def write_stability(
     models = [
         replace(model, name=f"{analysis.law} {model.name}")
         for analysis in analyses
-        for model in analysis.loops
+        for model in analysis.models
     ]
     write_models(models, directory)
     scenario = analyses[0].scenario
