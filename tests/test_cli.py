@@ -99,7 +99,8 @@ def test_laws_lists_names_and_titles(capsys):
         (["--set", "seed"], "seed", "key=value"),
         (["--seed", "1.5"], "seed", "integer"),
         (["--set", "sound.high_hz=60000"], "sound.high_hz", "lower it"),
-        (["--set", "tdoa.band_hz=[300, 60000]"], "tdoa.band_hz", "50000"),
+        (["--set", "tdoa.band_hz=[300, 60000]"], "tdoa.band_hz.1", "50000"),
+        (["--set", "tdoa.band_hz=wide"], "tdoa.band_hz", "found"),
         (
             ["--set", "obstacles=[{name: a, waypoints_m: [[0.1, 0.2]]}]"],
             "obstacles.0",

@@ -43,9 +43,35 @@ def explain(
     Returns:
         The error to raise.
     """
-    found = error.errors(include_url=False)
+    found = _of_likely_branches(error.errors(include_url=False))
     faults = [fault for each in found for fault in _faults(each, schema, what, written)]
     return InputError.joined(faults)
+
+
+def _of_likely_branches(found: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """Keeps the errors of one type if the type of a field is a choice of types.
+
+    pydantic reports the errors of all types of the choice. The type to keep is the one
+    that the value comes nearest to: one of whose elements is wrong, or a text for a
+    text. The name of the type, for example ``literal['found']``, leaves the path.
+    """
+    kept: dict[tuple[int | str, ...], ErrorDetails] = {}
+    for each in found:
+        place = [isinstance(part, str) and "[" in part for part in each["loc"]]
+        if True not in place or each["loc"][-1] == "[key]":
+            kept[each["loc"]] = each
+            continue
+        at = place.index(True)
+        field, below = each["loc"][:at], each["loc"][at + 1 :]
+        other = kept.get(field)
+        as_text = isinstance(each["input"], str) and each["type"] == "literal_error"
+        if other is None or below or as_text:
+            kept.pop(field, None)
+            kept[(*field, *below)] = {**each, "loc": (*field, *below)}
+        # An element is wrong: the errors of the whole value do not matter.
+        if any(loc[:at] == field and len(loc) > at for loc in kept):
+            kept.pop(field, None)
+    return list(kept.values())
 
 
 def _faults(

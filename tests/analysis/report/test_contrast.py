@@ -40,7 +40,6 @@ GROUNDS = {
     "#BBBBBB": "contours of a Nichols chart, a grid",
     "#B0B0B0": "hatching of empty cells",
     "#DCEBF7": "area, whose edge is drawn",
-    "#F6D3BF": "area",
     "#F3E6EF": "odour, whose edge is drawn",
     "#E7CCDF": "odour",
     "#D9AECB": "odour",
