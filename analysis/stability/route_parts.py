@@ -39,6 +39,7 @@ from analysis.routes.trajectory_plots import (
 )
 from analysis.stability.law_analysis import Part, Study
 from analysis.stability.margin_parts import margin_criteria
+from analysis.stability.requirements import REQUIRED
 from systems.ranging.parameters import OBJECT_SLOTS
 
 #: Fields of ``LoopMargins`` that the JSON document contains.
@@ -140,7 +141,8 @@ FROZEN_GAINS = Part[Sequence[FrozenPoint]](
         ),
         *margin_criteria(_all_cuts),
         Criterion(
-            "least delay margin of the loop without sampling", "s", "at least", 0.1,
+            "least delay margin of the loop without sampling", "s", "at least",
+            REQUIRED.delay_margin_s,
             "it tolerates more added delay than the threshold",
             "less added delay than the threshold makes it oscillate",
             "set by this project; phase margin divided by crossover frequency",
