@@ -26,7 +26,7 @@ from analysis.arrays.locate import located
 from analysis.arrays.locate_plots import plot_locate, write_locate
 from analysis.arrays.locate_result import LocatedSource
 from analysis.arrays.locate_text import locate_text
-from analysis.arrays.prepared_recording import RecordedSamples, recorded_samples
+from analysis.arrays.recorded_samples import RecordedSamples, recorded_samples
 from phonotaxis.result import Prepared, Result, ignore
 
 if TYPE_CHECKING:

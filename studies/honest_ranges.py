@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from analysis.arrays.locate import hear
 from analysis.arrays.locate_result import LocatedSource
-from analysis.arrays.prepared_recording import RecordedSamples
+from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.recording_search import MAD_TO_STD
 from analysis.report.intervals import estimate_rate
 from studies.support.drawn_recordings import (

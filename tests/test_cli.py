@@ -77,7 +77,7 @@ def test_laws_lists_names_and_titles(capsys):
     status, out, _ = call(capsys, "laws")
     assert status == 0
     listed = json.loads(call(capsys, "laws", "--json")[1])
-    assert listed["schema_version"] == 1
+    assert listed["schema_version"] == 2
     assert [line.split(maxsplit=1) for line in out.splitlines()] == [
         [law["name"], law["title"]] for law in listed["laws"]
     ]

@@ -16,6 +16,7 @@ from analysis.arrays.observability import (
     gains_nothing,
 )
 from analysis.report.plain_values import plain, write_json
+from analysis.report.provenance import SCHEMA_VERSION
 from diagrams.scenario.yaml_text import dump_yaml
 
 # Most independent directions that a document lists.
@@ -68,7 +69,7 @@ def calibration_document(run: CalibrationRun) -> dict[str, Any]:
     told = min(len(ratios), _MOST_DIRECTIONS)
     misfit = run.misfit
     return {
-        "schema_version": 1,
+        "schema_version": SCHEMA_VERSION,
         "geometry": plain(calibrated_fields(calibration, run.geometry)),
         "stated": plain(run.geometry),
         "gains_nothing": gains_nothing(calibration),

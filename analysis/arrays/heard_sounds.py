@@ -15,8 +15,8 @@ from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
     SNAPSHOTS,
     prepared_recording,
-    recorded_samples,
 )
+from analysis.arrays.recorded_samples import recorded_samples
 from analysis.arrays.recording_search import MAD_TO_STD, RecordingSearch, Sighting
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape

@@ -18,7 +18,8 @@ from analysis.arrays.array_geometry import (
 )
 from analysis.arrays.channel_faults import ChannelFault
 from analysis.arrays.live_faults import LiveFaults
-from analysis.arrays.prepared_recording import array_mismatch, chosen_microphones
+from analysis.arrays.prepared_recording import chosen_microphones
+from analysis.arrays.recorded_samples import array_mismatch
 from analysis.arrays.sound_stream import SoundBlock, SoundStream, StreamBrokenError
 from analysis.arrays.voting.direction_votes import VotePlan
 from analysis.arrays.voting.source_listener import (

@@ -13,9 +13,9 @@ from analysis.arrays.locate_result import LocatedSource, SourceEstimate
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
     SNAPSHOTS,
-    RecordedSamples,
     prepared_recording,
 )
+from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.recording_search import RecordingSearch, Sighting
 from analysis.arrays.recording_spectra import (
     AFTER_S,

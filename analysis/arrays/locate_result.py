@@ -15,6 +15,7 @@ from analysis.arrays.channel_faults import ChannelFault
 from analysis.arrays.heard_sources import HeardSource, HeardSources
 from analysis.arrays.recording_search import MAD_TO_STD
 from analysis.arrays.source_placement import PlacedSource
+from analysis.report.provenance import SCHEMA_VERSION
 from systems.sound.array_shape import ArrayShape
 
 # Estimates within this angle of the most common direction belong to one source, deg.
@@ -201,7 +202,7 @@ class LocatedSource:
     def document(self) -> dict[str, Any]:
         """Returns the JSON document that the command line writes."""
         return {
-            "schema_version": 1,
+            "schema_version": SCHEMA_VERSION,
             "array": self.array,
             "estimates": [asdict(estimate) for estimate in self.estimates],
             "summary": self.main_source(),

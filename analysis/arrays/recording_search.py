@@ -55,8 +55,9 @@ _ALIKE_S, _EARLIER_S = 1e-4, 4e-4
 class Sighting(AlignedDelays):
     """A stretch of the recording in which one source position stands out.
 
-    The delays ``tau`` include the shifts of the channels before the fit. The coherence
-    is the share of the sound that arrives directly from the source.
+    The search shifts the channels in time before it fits delays. The delays ``tau`` are
+    the sum of shift and fitted delay. The coherence is the share of the sound that
+    arrives directly from the source.
     """
 
     t_s: float

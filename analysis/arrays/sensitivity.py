@@ -139,8 +139,8 @@ def sensitivity_table(
     """Computes the effect of each unit error for each position of the source.
 
     The unit errors are 1 mm, 1 us, 1 % of the speed of sound, and 1 dB. Each row of the
-    JSON document has its own ``trials`` frames. In the document, an infinite standard
-    deviation of the range is None.
+    table is computed from ``trials`` audio frames of its own. An infinite standard
+    deviation of the range is None, because JSON has no infinite numbers.
     """
     loudspeaker = Loudspeaker.of("chirp", seed)
     rows = []

@@ -119,9 +119,12 @@ def _of_stretch(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
     """Estimates the lateness of each channel in a stretch if only this channel is late.
 
-    The results are the (n,) lateness, s, its inverse variance, the part of its variance
-    from errors that are the same in all stretches, and the sum of squared whitened
-    residuals of the stretch.
+    Returns four values:
+
+    - (n,) lateness in seconds;
+    - (n,) inverse of the variance of the lateness;
+    - (n,) part of this variance due to errors that are the same in all stretches;
+    - sum of the squared whitened residuals of the stretch.
     """
     c = array.c
     allowed = tolerance(sighting, array)

@@ -144,9 +144,8 @@ def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
     The function builds the diagram of the first run. It also builds the diagram of
     every run in which a field has a new text or mapping as its value.
 
-    It returns whether to use the compiled engine for scenarios that do not choose an
-    engine. That is the case for many runs, unless numba cannot compile code of the
-    user.
+    Returns whether scenarios that do not choose an engine use the compiled engine. They
+    do if the sweep has many runs and numba can compile the code of the user.
     """
     compiled = len(points) >= MANY_RUNS
     seen: set[str] = set()

@@ -148,9 +148,10 @@ def plot_adaptation(found: AdaptationStability) -> Figure:
 
 
 def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
-    """Plots the amplification over frequency, over robots and over D.
+    """Plots the amplification along a chain of robots in three panels.
 
-    Dots show the simulated amplitudes of ``runs`` in the same chains.
+    The panels show it over frequency, over the number of the robot, and over the
+    damping D. Dots show the amplitudes of the simulations ``runs``.
     """
     figure = Figure(figsize=(11.4, 3.9), layout="constrained")
     left, middle, right = figure.subplots(1, 3)

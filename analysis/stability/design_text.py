@@ -103,8 +103,10 @@ def write_design(study: DesignStudy, document: dict[str, Any], directory: Path) 
     """Writes the files of a design into an existing directory.
 
     - ``summary.json`` is the JSON document from ``design_document``.
-    - ``scenario.yaml`` is the scenario with new gains of the laws.
-    - ``recommended.yaml`` is the scenario with the recommended gains.
+    - ``scenario.yaml`` is the scenario with the current attraction and new gains of the
+      laws.
+    - ``recommended.yaml`` is the scenario with the recommended attraction and new gains
+      of the laws.
     - ``design.png`` is the figure of ``plot_design``.
     - ``law_curves.png`` shows the forces of the laws.
     """

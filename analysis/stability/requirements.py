@@ -79,8 +79,8 @@ class Check:
 class Requirements:
     """Requirements on the attraction and on the gains of the laws.
 
-    The criteria of the stability report have the same thresholds. The first six are
-    bounds of the loop to the follow point.
+    The criteria of the stability report use the same values as thresholds. The first
+    six fields are bounds on the control loop that moves the robot to the follow point.
     """
 
     damping_ratio: float = 0.4

@@ -27,8 +27,8 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     """Draws measured, estimated and commanded quantities of one robot over time.
 
     Bursts of the source are shaded. The clearance is that of ``panels``. If the robot
-    has a safety guard, one panel shows the actions of the guard. Another panel shows
-    the distance that the robot has to spare.
+    has a safety guard, two panels show the actions of the guard and the distance beyond
+    the one that the guard keeps.
     """
     shown, bursts = panels(result, clearance), heard_bursts(result)
     size = WIDTH_IN, 1.0 + PANEL_IN * len(shown)

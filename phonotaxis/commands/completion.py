@@ -33,6 +33,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(options: Namespace, take: Take) -> Prepared[Printed]:
     import shtab
 
+    from analysis.report.provenance import SCHEMA_VERSION
     from diagrams import library_scenarios
     from diagrams.scenario.fields.shipped import known_laws
 
@@ -48,7 +49,9 @@ def _prepare(options: Namespace, take: Take) -> Prepared[Printed]:
     # source such scripts.
     script = script.replace("[-1] == eval ]]", "[-1] == (eval|file) ]]")
     return Prepared(
-        run=lambda _: Printed({"schema_version": 1, "script": script}, script)
+        run=lambda _: Printed(
+            {"schema_version": SCHEMA_VERSION, "script": script}, script
+        )
     )
 
 

@@ -53,6 +53,8 @@ def _prepare(options: Namespace, take: Take) -> Prepared[Printed]:
     place = take(options.out) if options.out is not None else None
 
     def export(_: object) -> Printed:
+        from analysis.report.provenance import SCHEMA_VERSION
+
         if place:
             _write(run, names, place.directory)
         else:
@@ -63,7 +65,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[Printed]:
         shown = place.out if place else result
         files = [str(shown / name) for name in names]
         document = {
-            "schema_version": 1,
+            "schema_version": SCHEMA_VERSION,
             "scenario": run.scenario.name,
             "rows": len(run.table),
             "files": files,

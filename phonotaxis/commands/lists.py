@@ -39,10 +39,12 @@ def _laws(options: Namespace, take: Take) -> Prepared[Printed]:
 
 def _listing(plural: str, about: str, rows: Mapping[str, str]) -> Prepared[Printed]:
     """Lists names, each with one line of text; the words are keys of the document."""
+    from analysis.report.provenance import SCHEMA_VERSION
+
     width = max(map(len, rows))
     text = "\n".join(f"{name:<{width}}  {line}" for name, line in rows.items())
     listed = [{"name": name, about: line} for name, line in rows.items()]
-    return _printed({"schema_version": 1, plural: listed}, text)
+    return _printed({"schema_version": SCHEMA_VERSION, plural: listed}, text)
 
 
 def _printed(
@@ -72,6 +74,7 @@ def _add_fields_arguments(parser: ArgumentParser) -> None:
 
 
 def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
+    from analysis.report.provenance import SCHEMA_VERSION
     from diagrams.scenario.fields.field_list import fields_of_law, find_fields
     from diagrams.scenario.fields.shipped import scenario_schema, schema_text
 
@@ -88,7 +91,8 @@ def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
         return _printed(schema, schema_text().rstrip("\n"))
     listed = [asdict(field) for field in found]
     return _printed(
-        {"schema_version": 1, "fields": listed}, "\n".join(map(_paragraph, found))
+        {"schema_version": SCHEMA_VERSION, "fields": listed},
+        "\n".join(map(_paragraph, found)),
     )
 
 
@@ -118,6 +122,7 @@ def _add_columns_arguments(parser: ArgumentParser) -> None:
 
 
 def _columns(options: Namespace, take: Take) -> Prepared[Printed]:
+    from analysis.report.provenance import SCHEMA_VERSION
     from analysis.runs.columns import COLUMNS, Column
     from systems.framework.input_error import InputError
 
@@ -141,7 +146,7 @@ def _columns(options: Namespace, take: Take) -> Prepared[Printed]:
         for column in found
     )
     listed = [column._asdict() for column in found]
-    return _printed({"schema_version": 1, f"{kind}s": listed}, text)
+    return _printed({"schema_version": SCHEMA_VERSION, f"{kind}s": listed}, text)
 
 
 def _doctor(options: Namespace, take: Take) -> Prepared[Printed]:
@@ -149,6 +154,8 @@ def _doctor(options: Namespace, take: Take) -> Prepared[Printed]:
     from analysis.run_error import RunError
 
     def run(_: object) -> Printed:
+        from analysis.report.provenance import SCHEMA_VERSION
+
         findings = examine()
         bad = [each.name for each in findings if each.verdict == "bad"]
         lines = []
@@ -157,7 +164,7 @@ def _doctor(options: Namespace, take: Take) -> Prepared[Printed]:
             lines.append(f"{_SIGNS[each.verdict]} {each.name:<15} {each.found}{remedy}")
         return Printed(
             {
-                "schema_version": 1,
+                "schema_version": SCHEMA_VERSION,
                 "ok": not bad,
                 "findings": [asdict(each) for each in findings],
             },

@@ -26,7 +26,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Prepared[LocateResult]:
     from analysis.arrays.array_geometry import make_geometry
-    from analysis.arrays.prepared_recording import recorded_samples
+    from analysis.arrays.recorded_samples import recorded_samples
 
     geometry = make_geometry(options.geometry)
     recorded = recorded_samples(options.recording, geometry)

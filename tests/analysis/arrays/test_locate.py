@@ -417,7 +417,7 @@ def test_document_has_the_keys_that_others_rely_on(tmp_path):
     path = record(tmp_path / "a.wav", ROBOT, polar(25.0, 1.5))
     result = locate(path)
     document = json.loads(json.dumps(result.document(), allow_nan=False))
-    assert document["schema_version"] == 1
+    assert document["schema_version"] == 2
     assert {"array", "estimates", "summary"} <= document.keys()
     assert {
         "t_s",

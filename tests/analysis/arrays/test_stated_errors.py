@@ -10,7 +10,7 @@ import pytest
 from analysis.arrays.aligned_delays import AlignedDelays
 from analysis.arrays.array_geometry import ArrayGeometry
 from analysis.arrays.locate import hear
-from analysis.arrays.prepared_recording import RecordedSamples
+from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.source_placement import has_place, place_source
 
 C, RATE = 343.0, 48_000
