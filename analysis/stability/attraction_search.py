@@ -309,8 +309,8 @@ def _chosen(
 def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scenario:
     """Chooses the follow distance, and the gains of the scenario's law with it.
 
-    The follow distance is at least the current one, leaves room for the overshoot, and
-    is so long that the law shifts P at rest little enough.
+    The follow distance is at least the current one, and leaves room for the overshoot.
+    At rest, the law shifts P by at most the required offset.
     """
     law = scenario.only.law
     least = follow_distance(scenario, requirements, braking_overshoot(scenario))

@@ -61,7 +61,7 @@ def place(offset_m, *, stable=True):
 
 
 def points(**changed):
-    """Operating points with other numbers in the place of some."""
+    """Made-up operating points; ``changed`` replaces some of their numbers."""
     rest = {
         # Damping ratios 0.6 and 0.28; the fast pair, ratio 0.05, is a motor's.
         "eigenvalues": np.array(
