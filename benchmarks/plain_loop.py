@@ -161,7 +161,7 @@ class PlainLoop:
         vectors = collision_vectors(
             points,
             scenario.follower.collision_vector,
-            scenario.follower.ultrasonic.neighbours,
+            scenario.follower.ultrasonic.neighbors,
         )
         return [[feature, *rotate(theta, x, y)] for feature, x, y in vectors]
 

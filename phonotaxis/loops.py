@@ -14,7 +14,7 @@ from analysis.stability.choice import chosen_laws, chosen_robot
 from analysis.stability.design_plots import plot_design
 from analysis.stability.design_study import STUDY_RUNS, DesignStudy, study_design
 from analysis.stability.design_text import design_document, design_text, write_design
-from analysis.stability.law_analysis import LawAnalysis, analyse_law
+from analysis.stability.law_analysis import LawAnalysis, analyze_law
 from analysis.stability.report_files import (
     report_figures,
     stability_document,
@@ -178,7 +178,7 @@ def prepare_stability(
     work = report_parts.parts_for(scenarios)
 
     def run(step: Callable[[str], None]) -> StabilityResult:
-        analyses = [analyse_law(each, work, full=full, step=step) for each in scenarios]
+        analyses = [analyze_law(each, work, full=full, step=step) for each in scenarios]
         return StabilityResult(analyses, note)
 
     return Prepared(run=run, total=len(work) * len(scenarios), unit="parts")

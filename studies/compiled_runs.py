@@ -19,7 +19,7 @@ import numpy as np
 from analysis.batches.comparison_plans import comparison_plan, library_layouts
 from diagrams import RunResult, simulate
 from studies.tables import MissedBoundError, Table
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 #: Beyond this places differ, m.
 TOLERANCE_M = 1e-9

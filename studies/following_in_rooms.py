@@ -1,7 +1,7 @@
 """The closed loop in a room.
 
 `obstacle_free` in the free field, and in a room of 7 m x 7 m x 3 m that
-reverberates for 0.4 s, with coloured ego noise 20 dB below the source at 1 m: how
+reverberates for 0.4 s, with colored ego noise 20 dB below the source at 1 m: how
 much of the run the robot follows; and, from starts with the source behind it, how
 often the target is on the source's side after one burst, two and three. Exit
 status 1 if the room costs more than a twentieth of the following, or more than a

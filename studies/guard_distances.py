@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Wedge
 
-from analysis.report.palette import COLOURS, SERIES_COLOURS, draw_grid
+from analysis.report.palette import COLORS, SERIES_COLORS, draw_grid
 from analysis.safety.driver_trials import TWIST, make_trial, run_result
 from diagrams import RunResult, Scenario
 from diagrams.scenario.warnings.guarantees import clear_way, seen_angle_deg
@@ -101,12 +101,12 @@ def draw_chart(passed: Mapping[tuple[float, float], float]) -> Figure:
 
 def _draw_distances(axes: Axes, passed: Mapping[tuple[float, float], float]) -> None:
     speeds = np.linspace(0.05, 0.72, 25)
-    for u, colour in zip(BODIES_M_S, SERIES_COLOURS, strict=False):
+    for u, color in zip(BODIES_M_S, SERIES_COLORS, strict=False):
         name = f"bodies up to {u:g} m/s" if u else "obstacles at rest: static safety"
         needed = [needed_distance(v, u) for v in speeds.tolist()]
-        axes.plot(speeds, needed, color=colour, label=name)
+        axes.plot(speeds, needed, color=color, label=name)
         runs = [passed[v, u] for v in SPEEDS_M_S]
-        axes.plot(SPEEDS_M_S, runs, "o", color=colour)
+        axes.plot(SPEEDS_M_S, runs, "o", color=color)
     axes.set(
         xlabel="speed of the robot (m/s)",
         ylabel="clear way that it needs, from the axle (m)",
@@ -125,9 +125,9 @@ def _draw_views(axes: Axes) -> None:
         for each in sensors.sensors:
             middle, half = 90.0 + each.axis_deg, each.beam_half_angle_deg
             wedge = Wedge((x, 0.0), 1.0, middle - half, middle + half)
-            wedge.set(facecolor=COLOURS["seen"], alpha=0.35, linewidth=0.0)
+            wedge.set(facecolor=COLORS["seen"], alpha=0.35, linewidth=0.0)
             axes.add_patch(wedge)
-        axes.plot([x], [0.0], "o", color=COLOURS["robot"])
+        axes.plot([x], [0.0], "o", color=COLORS["robot"])
         share = seen_angle_deg(sensors, robot.control_point_m)
         movers = " ".join(_against_movers(share)).split(" ", 2)
         lines = [name, f"sees {share:.0f} deg", "static safety", "and", *movers]

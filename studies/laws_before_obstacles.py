@@ -139,13 +139,13 @@ def oscillations() -> Table:
                 run, predicted = found.runs[term], found.predictions[term]
                 middle = len(run.amplitudes_m) // 2
                 amplitude = float(run.amplitudes_m[middle])
-                centre, growth, frequency = predicted.at(amplitude)
+                center, growth, frequency = predicted.at(amplitude)
                 simulated = run.frequencies_rad_s.mean()
                 yield [
                     law,
                     shown,
                     f"{1e3 * amplitude:.0f} mm",
-                    f"{centre:.4f}, {run.centres_m[middle]:.4f} m",
+                    f"{center:.4f}, {run.centers_m[middle]:.4f} m",
                     f"{growth:.4f}, {run.growth_per_s[middle]:.4f} 1/s",
                     f"{frequency:.3f}, {simulated:.3f} rad/s",
                 ]

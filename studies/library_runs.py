@@ -14,7 +14,7 @@ from analysis.runs.metric_table import run_metrics
 from analysis.runs.run_report import run_document, run_text
 from diagrams import RunResult, load_scenario, simulate
 from studies.tables import Table
-from systems.laws.catalogue import FORCE_LAWS
+from systems.laws.catalog import FORCE_LAWS
 
 SEED = 1
 #: Rows of the table of endings.
@@ -59,8 +59,8 @@ def following() -> Table:
         "with a range, of those heard": f"{metrics['detections_with_range']} "
         f"of {metrics['detections']}",
         "error of the estimated position": (
-            f"{_millimetres(metrics['source_error_median_m'])} median, "
-            f"{_millimetres(metrics['source_error_p95_m'])} at 95 %"
+            f"{_millimeters(metrics['source_error_median_m'])} median, "
+            f"{_millimeters(metrics['source_error_p95_m'])} at 95 %"
         ),
         "distance from the source while it moves, after the second burst": (
             f"{least:.2f} m to {most:.2f} m, {mean:.2f} m on average"
@@ -99,5 +99,5 @@ def _ending(result: RunResult) -> str:
     return f"{_VERBS.get(result.cause, result.cause)}, {clearance:.2f} m"
 
 
-def _millimetres(value: float | None) -> str:
+def _millimeters(value: float | None) -> str:
     return "-" if value is None else f"{1e3 * value:.0f} mm"

@@ -15,7 +15,7 @@ from analysis.loops.contact_mode import contact_limits
 from analysis.loops.delay_margin import DELAY_PLACES, DelayedLoop
 from analysis.loops.delayed_run import check_delay_margin
 from analysis.loops.equilibria import find_equilibria, follow_equilibrium
-from analysis.loops.linearisation import check_gradient, compare_routes
+from analysis.loops.linearization import check_gradient, compare_routes
 from analysis.loops.loop_margins import LoopMargins, all_margins, loop_margins
 from analysis.loops.open_loops import DIRECTIONS, BreakPoint, target_loop
 from analysis.loops.operating_points import OperatingPoint, moving_equilibrium

@@ -3,7 +3,7 @@
 The cells of Han 2019 (1-4 m; 0, 30 and 60 deg) in the free field, sound of
 0.5-8 kHz 20 dB above white noise at the array, 25 ms at 100 kHz; every
 estimator gets the same frames. Each trial's bearing lies within half a degree
-of its cell's, so that no search grid is favoured. Cells are the RMSE of the bearing in
+of its cell's, so that no search grid is favored. Cells are the RMSE of the bearing in
 deg / of the range in m; in brackets the share of outliers, which are left out.
 """
 

@@ -16,7 +16,7 @@ from analysis.batches.plan import load_sweep
 from analysis.report.intervals import estimate_rate
 from diagrams import simulate
 from studies.tables import Table
-from systems.laws.catalogue import ROUTE_LAWS
+from systems.laws.catalog import ROUTE_LAWS
 
 #: Of the layouts.
 SEED = 2026

@@ -15,8 +15,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
-from analysis.report.palette import COLOURS, ROBOT_COLOURS
-from analysis.report.render import COLOURS_CSS
+from analysis.report.palette import COLORS, ROBOT_COLORS
+from analysis.report.render import COLORS_CSS
 from analysis.views.replay import write_replay
 from diagrams import load_scenario, simulate
 
@@ -44,17 +44,17 @@ def pixels(shot: bytes) -> NDArray[np.float64]:
 def test_lines_of_drawings_on_their_page(
     browser: Any, tmp_path: Path, scheme: str
 ) -> None:
-    """Each colour as an SVG line on white, turned over at night as pages do it."""
-    lines = [colour for name, colour in COLOURS.items() if name != "sound"]
-    lines += ROBOT_COLOURS
+    """Each color as an SVG line on white, turned over at night as pages do it."""
+    lines = [color for name, color in COLORS.items() if name != "sound"]
+    lines += ROBOT_COLORS
     drawn = "".join(
-        f'<rect x="{20 * k}" y="0" width="20" height="20" fill="{colour}"/>'
-        for k, colour in enumerate(lines)
+        f'<rect x="{20 * k}" y="0" width="20" height="20" fill="{color}"/>'
+        for k, color in enumerate(lines)
     )
     wide = 20 * len(lines)
     path = tmp_path / "swatches.html"
     path.write_text(
-        f"<!DOCTYPE html><style>{COLOURS_CSS} body {{ margin: 0 }} "
+        f"<!DOCTYPE html><style>{COLORS_CSS} body {{ margin: 0 }} "
         "svg { filter: var(--drawing); display: block }</style>"
         f'<svg width="{wide}" height="40"><rect width="{wide}" height="40" '
         f'fill="white"/>{drawn}</svg>'

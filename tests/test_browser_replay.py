@@ -66,10 +66,10 @@ def pictures(page: Any) -> list[np.ndarray]:
 
 
 def _place(picture: np.ndarray, channel: int) -> np.ndarray:
-    """Mean column and row of the pixels in which one colour rules."""
+    """Mean column and row of the pixels in which one color rules."""
     others = np.delete(picture, channel, axis=2).max(axis=2)
     rows, columns = np.nonzero(picture[:, :, channel] > others + 0.25)
-    assert len(rows) > 50, "the body of this colour is not in the picture"
+    assert len(rows) > 50, "the body of this color is not in the picture"
     return np.array([columns.mean(), rows.mean()])
 
 

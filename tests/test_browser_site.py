@@ -29,11 +29,11 @@ const luminance = ([r, g, b]) => [r, g, b]
   .map(v => v / 255)
   .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
   .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
-const parts = colour => colour.match(/[\\d.]+/g).map(Number);
+const parts = color => color.match(/[\\d.]+/g).map(Number);
 function behind(view, element) {
   for (; element; element = element.parentElement) {
-    const colour = parts(view.getComputedStyle(element).backgroundColor);
-    if (colour.length === 3 || colour[3] > 0.5) return colour;
+    const color = parts(view.getComputedStyle(element).backgroundColor);
+    if (color.length === 3 || color[3] > 0.5) return color;
   }
   return [255, 255, 255];
 }

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from analysis.stability.law_analysis import analyse_law
+from analysis.stability.law_analysis import analyze_law
 from analysis.stability.report_files import stability_page
 from analysis.stability.report_parts import SOUND_PARTS
 from diagrams import load_scenario
@@ -24,7 +24,7 @@ PARTS = 4
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("stability") / "report.html"
-    analysis = analyse_law(load_scenario(), SOUND_PARTS[:PARTS])
+    analysis = analyze_law(load_scenario(), SOUND_PARTS[:PARTS])
     path.write_text(stability_page([analysis]))
     return path
 

@@ -61,7 +61,7 @@ def fail(*_args, **_options):
     [
         (["design"], "phonotaxis.loops.study_design"),
         (["simulate", *SHORT], "diagrams.simulate"),
-        (["stability"], "phonotaxis.loops.analyse_law"),
+        (["stability"], "phonotaxis.loops.analyze_law"),
         (["accuracy"], "analysis.arrays.localization.prepare_localization"),
         (["locate", "heard.wav"], "phonotaxis.recordings.located"),
         (["scenarios"], "diagrams.library_scenarios"),

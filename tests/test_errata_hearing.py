@@ -98,7 +98,7 @@ def test_han_eq_5_runs_past_the_end() -> None:
         [first[k] - second[k + 1] for k in range(len(first))]
 
 
-def test_han_eq_5_favours_large_lags() -> None:
+def test_han_eq_5_favors_large_lags() -> None:
     """True lag 40 samples; the sum of one or two terms is the smallest."""
     first, second = two_channels(40, 0.1)
     similarity = [printed_eq_5(first, second, j) for j in range(2500)]
@@ -216,7 +216,7 @@ def test_kim_eq_8_returns_what_the_times_are_counted_from(source, counted_from) 
 
 
 @given(source=sources)
-def test_kim_eq_8_with_travelling_times_is_zero(source) -> None:
+def test_kim_eq_8_with_traveling_times_is_zero(source) -> None:
     times = [R_i / SPEED for R_i in distances(*source)]
     assert kim_eq_8(*times) == pytest.approx(0.0, abs=1e-9)
 

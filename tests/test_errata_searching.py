@@ -112,7 +112,7 @@ def test_song_eq_17_turns_round_where_the_sum_changes_its_sign():
 
 
 def test_song_sec_4_3_a_stop_at_20_cm_is_within_both_arms():
-    """15 and 20 cm of arms between the centres; and 4 dB make 20 cm 13 to 32 cm."""
+    """15 and 20 cm of arms between the centers; and 4 dB make 20 cm 13 to 32 cm."""
     assert Y_ARM + 0.2 > 0.2
     # By eq. 8 with n = 2: the distance is proportional to 10^(-R / 20).
     near, far = (0.2 * 10.0 ** (-db / 20.0) for db in (4.0, -4.0))

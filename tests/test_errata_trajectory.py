@@ -170,7 +170,7 @@ def test_engelbrecht_eq_6_holds_for_ever_what_has_momentum():
 
 
 def test_engelbrecht_sec_1_a_star_is_up_to_8_percent_long():
-    """ "The closest possible path" on eight neighbours: at 22.5 deg to an axis."""
+    """ "The closest possible path" on eight neighbors: at 22.5 deg to an axis."""
     size = 200
     blocked = np.zeros((size, size), dtype=np.bool_)
     end = (199, round(199 * math.tan(math.radians(22.5))))

@@ -176,7 +176,7 @@ def test_reader_refuses_what_says_nothing(docstring: str, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "content", ["metres", "AudioFrame", "rad, rad, rad", "sinister"]
+    "content", ["meters", "AudioFrame", "rad, rad, rad", "sinister"]
 )
 def test_wrong_contents_are_found(content: str) -> None:
     port = systems.WheelOdometry().get_input_port(0)

@@ -25,7 +25,7 @@ from diagrams.scenario.shorthand import ROBOT_FIELDS
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 from systems.routes.parameters import RouteParameters
 from systems.sound.parameters import SoundParameters
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.arrays.calibrate import CalibrationRun
-from analysis.report.palette import SERIES_COLOURS, draw_grid
+from analysis.report.palette import SERIES_COLORS, draw_grid
 
 
 def plot_calibration(run: CalibrationRun) -> Figure:
@@ -24,7 +24,7 @@ def plot_calibration(run: CalibrationRun) -> Figure:
     stds = np.sqrt(np.diag(calibration.of_places)).reshape(places.shape)
     figure = Figure(figsize=(6.0, 5.0), layout="constrained")
     axes = figure.subplots()
-    axes.plot(*stated[:, :2].T, "x", color=SERIES_COLOURS[1], label="stated")
+    axes.plot(*stated[:, :2].T, "x", color=SERIES_COLORS[1], label="stated")
     axes.errorbar(
         places[:, 0],
         places[:, 1],
@@ -32,7 +32,7 @@ def plot_calibration(run: CalibrationRun) -> Figure:
         yerr=stds[:, 1],
         fmt="o",
         markersize=4,
-        color=SERIES_COLOURS[0],
+        color=SERIES_COLORS[0],
         label="calibrated",
     )
     for k, place in enumerate(places):

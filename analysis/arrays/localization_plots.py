@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from analysis.arrays.cramer_rao import polar_point
 from analysis.arrays.localization import LocalizationCell
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 
 #: Color and label of each estimator.
 _STYLES = {
-    "paper": (COLOURS["obstacle"], "the papers' estimator"),
-    "fast": (COLOURS["left"], "fast"),
-    "ml": (COLOURS["robot"], "maximum likelihood"),
+    "paper": (COLORS["obstacle"], "the papers' estimator"),
+    "fast": (COLORS["left"], "fast"),
+    "ml": (COLORS["robot"], "maximum likelihood"),
 }
 #: Half axes of ellipses, in standard deviations.
 _SIGMAS = 2.0
@@ -63,11 +63,11 @@ def _floor(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
         x, y = distance * np.cos(arc), distance * np.sin(arc)
         axes.plot(x, y, color="#E5E5E5", linewidth=0.8, zorder=0)
     axes.plot(
-        [0.0] * 3, [0.4, 0.0, -0.4], "o", markersize=5, color=COLOURS["obstacle"],
+        [0.0] * 3, [0.4, 0.0, -0.4], "o", markersize=5, color=COLORS["obstacle"],
         label="microphones",
     )  # fmt: skip
     truth = np.array([_truth(cell) for cell in cells])
-    axes.plot(*truth.T, "+", markersize=11, color=COLOURS["source"], label="source")
+    axes.plot(*truth.T, "+", markersize=11, color=COLORS["source"], label="source")
 
 
 def _truth(cell: LocalizationCell) -> NDArray[np.float64]:
@@ -85,8 +85,8 @@ def _to_scale(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
                 2.0 * _SIGMAS * paper.range_std_m,
                 2.0 * _SIGMAS * across,
                 angle=paper.bearing_mean_deg,
-                facecolor=COLOURS["sound"],
-                edgecolor=COLOURS["echo"],
+                facecolor=COLORS["sound"],
+                edgecolor=COLORS["echo"],
                 alpha=0.6,
                 label=label,
             )
@@ -117,7 +117,7 @@ def _exaggerated(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
     titles = [_STYLES[name] for name in _by_estimator(drawn)]
     for color, title in titles:
         axes.plot([], [], color=color, label=title)
-    axes.plot([], [], "--", color=COLOURS["source"], label="Cramer-Rao bound")
+    axes.plot([], [], "--", color=COLORS["source"], label="Cramer-Rao bound")
 
 
 def _spread(axes: Axes, cell: LocalizationCell, factors: NDArray[np.float64]) -> None:
@@ -130,7 +130,7 @@ def _spread(axes: Axes, cell: LocalizationCell, factors: NDArray[np.float64]) ->
     axes.plot(*about_mean.T, ".", markersize=1.5, color=color, alpha=0.35)
     for covariance, line, edge in (
         (np.cov(positions.T), "-", color),
-        (cell.heard.bound.covariance, "--", COLOURS["source"]),
+        (cell.heard.bound.covariance, "--", COLORS["source"]),
     ):
         ellipse = _ellipse(truth, stretch @ covariance @ stretch.T)
         ellipse.set(linestyle=line, edgecolor=edge, linewidth=1.2)

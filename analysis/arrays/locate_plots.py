@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from analysis.arrays.cramer_rao import polar_point
 from analysis.arrays.locate_result import LocatedSource, wrapped_deg
-from analysis.report.palette import COLOURS, ROBOT_COLOURS, draw_grid
+from analysis.report.palette import COLORS, ROBOT_COLORS, draw_grid
 from analysis.report.plain_values import write_json
 
 # Longest pause over which a track is drawn, s.
@@ -103,12 +103,12 @@ def _over_time(axes: Axes, result: LocatedSource, name: str) -> None:
         fmt="o",
         markersize=3.0,
         linewidth=0.8,
-        color=COLOURS["estimate"],
+        color=COLORS["estimate"],
     )
     if center is not None:
-        axes.axhline(center, color=COLOURS["source"], linewidth=1.2)
+        axes.axhline(center, color=COLORS["source"], linewidth=1.2)
         ends = center - std, center + std
-        axes.axhspan(*ends, color=COLOURS["source"], alpha=0.15, linewidth=0)
+        axes.axhspan(*ends, color=COLORS["source"], alpha=0.15, linewidth=0)
     draw_grid(axes)
 
 
@@ -122,7 +122,7 @@ def _others(axes: Axes, result: LocatedSource, length: float) -> None:
     for k, bearing in enumerate(bearings):
         x, y = polar_point(length, bearing)
         label = "further sources" if k == 0 else None
-        axes.plot((0, x), (0, y), "-.", color=COLOURS["source"], label=label)
+        axes.plot((0, x), (0, y), "-.", color=COLORS["source"], label=label)
 
 
 def _middle_deg(result: LocatedSource, main: float) -> float:
@@ -147,7 +147,7 @@ def _tracks(axes: Axes, result: LocatedSource, middle: float) -> None:
         around = middle + (bearing - middle + 180.0) % 360.0 - 180.0
         steps = np.diff(around, prepend=around[0]), np.diff(t_s, prepend=t_s[0])
         around[(np.abs(steps[0]) > 180.0) | (steps[1] > _GAP_S)] = np.nan
-        color = ROBOT_COLOURS[k % len(ROBOT_COLOURS)]
+        color = ROBOT_COLORS[k % len(ROBOT_COLORS)]
         axes.plot(t_s, around, color=color, label=f"{track.identity}")
     axes.legend(
         fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=8
@@ -161,18 +161,18 @@ def _plan(axes: Axes, result: LocatedSource) -> None:
     for e in result.estimates:
         if e.bearing_deg is not None:
             x, y = polar_point(e.range_m or 0.85 * size, e.bearing_deg)
-            axes.plot((0, x), (0, y), color=COLOURS["estimate"], alpha=0.25)
+            axes.plot((0, x), (0, y), color=COLORS["estimate"], alpha=0.25)
     summary = result.main_source()
     if summary["bearing_deg"] is not None:
         x, y = polar_point(0.95 * size, summary["bearing_deg"])
-        axes.plot((0, x), (0, y), color=COLOURS["source"], label="source")
+        axes.plot((0, x), (0, y), color=COLORS["source"], label="source")
         for other in summary["alternatives"]:
             if math.isclose(other["bearing_deg"], summary["bearing_deg"], abs_tol=0.5):
                 continue  # the mirror image has the same bearing
             x, y = polar_point(0.95 * size, other["bearing_deg"])
-            axes.plot((0, x), (0, y), "--", color=COLOURS["empty"], label="or")
+            axes.plot((0, x), (0, y), "--", color=COLORS["empty"], label="or")
     _others(axes, result, 0.95 * size)
-    axes.plot(*places.T, "o", color=COLOURS["robot"], markersize=4, label="microphones")
+    axes.plot(*places.T, "o", color=COLORS["robot"], markersize=4, label="microphones")
     for k, (x, y) in enumerate(places):
         axes.annotate(
             f"{k + 1}", (x, y), xytext=(4, 4), textcoords="offset points", fontsize=8

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.report.palette import SERIES_COLOURS, draw_grid
+from analysis.report.palette import SERIES_COLORS, draw_grid
 
 
 def plot_tracks(table: pd.DataFrame) -> Figure:
@@ -21,7 +21,7 @@ def plot_tracks(table: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     axes = figure.subplots()
     for k, (source, rows) in enumerate(table.groupby("source") if len(table) else ()):
-        color = SERIES_COLOURS[k % len(SERIES_COLOURS)]
+        color = SERIES_COLORS[k % len(SERIES_COLORS)]
         axes.plot(rows["t_s"], rows["bearing_deg"], ".", color=color, label=str(source))
     if len(table):
         axes.legend(title="source")

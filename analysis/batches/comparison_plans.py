@@ -15,7 +15,7 @@ from diagrams.scenario.loading import load_scenario, read_mapping
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from diagrams.scenario.settings import parse_setting
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS, ROUTE_LAWS
+from systems.laws.catalog import FORCE_LAWS, ROUTE_LAWS
 
 #: Names of the scenarios of the papers' experiments.
 EXPERIMENTS = (

@@ -11,7 +11,7 @@ from analysis.energy.certificate_trials import CertificateTrials
 from analysis.energy.energy_certificate import EnergyCertificate
 from analysis.energy.velocity_passivity import EnergyBalance
 from analysis.loops.point_mass import PointMass
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from systems.world.geometry import rectangle_corners
 
 
@@ -24,14 +24,14 @@ def draw_bodies(axes: Axes, model: PointMass) -> None:
     """
     for k, rectangle in enumerate(model.rectangles):
         is_source = k == len(model.rectangles) - 1
-        colour = COLOURS["source" if is_source else "obstacle"]
-        axes.add_patch(Polygon(rectangle_corners(rectangle), color=colour, zorder=3))
+        color = COLORS["source" if is_source else "obstacle"]
+        axes.add_patch(Polygon(rectangle_corners(rectangle), color=color, zorder=3))
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     ring = model.p_WS + model.follow_distance_m * np.array(
         [np.cos(angle), np.sin(angle)]
     ).T.reshape(-1, 2)
-    axes.plot(*ring.T, ":", color=COLOURS["source"], linewidth=1.0, zorder=3)
-    axes.plot(*model.p_WP, "+", color=COLOURS["robot"], markersize=10, zorder=4)
+    axes.plot(*ring.T, ":", color=COLORS["source"], linewidth=1.0, zorder=3)
+    axes.plot(*model.p_WP, "+", color=COLORS["robot"], markersize=10, zorder=4)
     axes.set_aspect("equal")
     axes.set_xlabel("x of P (m)")
     axes.set_ylabel("y of P (m)")
@@ -83,15 +83,15 @@ def plot_certificate_trials(trials: CertificateTrials) -> Figure:
         zorder=0,
     )
     hit = trials.outside.collided
-    for starts, marker, colour, label in (
-        (trials.inside.starts, ".", COLOURS["robot"], "certified"),
-        (trials.outside.starts[~hit], ".", COLOURS["echo"], "not certified, safe"),
-        (trials.outside.starts[hit], "x", COLOURS["source"], "collides"),
+    for starts, marker, color, label in (
+        (trials.inside.starts, ".", COLORS["robot"], "certified"),
+        (trials.outside.starts[~hit], ".", COLORS["echo"], "not certified, safe"),
+        (trials.outside.starts[hit], "x", COLORS["source"], "collides"),
     ):
         axes.plot(
             *starts[:2000, :2].T,
             marker,
-            color=colour,
+            color=color,
             markersize=4,
             label=f"{label}: {len(starts)}",
             zorder=2,
@@ -114,15 +114,15 @@ def plot_energy_balance(balance: EnergyBalance) -> Figure:
     """Plots energy, and work of the velocity term and of D_r, along one run."""
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
-    for energies, colour, label in (
+    for energies, color, label in (
         (balance.energies_j, "robot", "V"),
         (balance.dissipated_j, "empty", "taken by $D_r$"),
         (balance.injected_j, "source", "given by the velocity term"),
     ):
-        above.plot(balance.times_s, energies, color=COLOURS[colour], label=label)
+        above.plot(balance.times_s, energies, color=COLORS[color], label=label)
     above.set_ylabel("energy (J)")
     above.legend(loc="center right")
-    below.plot(balance.times_s, balance.clearances_m, color=COLOURS["obstacle"])
+    below.plot(balance.times_s, balance.clearances_m, color=COLORS["obstacle"])
     below.set_ylabel("clearance of P (m)")
     below.set_xlabel("time (s)")
     below.set_ylim(bottom=0.0)

@@ -19,7 +19,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from analysis.loops.linear_models import NEUTRAL, LinearModel, minimal_model
-from analysis.loops.linearisation import plant_jacobians
+from analysis.loops.linearization import plant_jacobians
 from analysis.loops.loop_margins import is_loop, loop_margins
 from analysis.loops.open_loops import Direction, closed, cut_model, open_loop
 from analysis.loops.operating_points import OperatingPoint

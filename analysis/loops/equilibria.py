@@ -250,7 +250,7 @@ def find_equilibria(
     points = [resting_equilibrium(loop, root) for root in roots]
     points.sort(key=lambda point: point.source_distance_m)
     unresolved = [
-        group.centres[group.strengths.argmin()] for group in search.groups(left, finest)
+        group.centers[group.strengths.argmin()] for group in search.groups(left, finest)
     ]
     return EquilibriumSearch(
         scenario=scenario,
@@ -290,7 +290,7 @@ class _Found:
 
         The equilibrium nearest to the robot's start represents a continuum.
         """
-        near = np.linalg.norm(group.centres - self.start, axis=1).argmin()
+        near = np.linalg.norm(group.centers - self.start, axis=1).argmin()
         turned = np.flatnonzero(group.winding)
         turned = turned[:: max(1, len(turned) // _MOST_TURNED)]
         weakest = np.argsort(group.strengths)[: _MOST_STARTS if first else 1]
@@ -300,10 +300,10 @@ class _Found:
         for cell in starts:
             if len(flat) > _MOST_STARTS:
                 break
-            root = nearest_equilibrium(field_, group.centres[cell])
+            root = nearest_equilibrium(field_, group.centers[cell])
             if root is None:
                 continue
-            if np.abs(group.centres - root).max(axis=1).min() > 2.0 * edge:
+            if np.abs(group.centers - root).max(axis=1).min() > 2.0 * edge:
                 continue
             sizes = np.abs(np.linalg.eigvals(field_.gradient(root)[1]))
             isolated = sizes.min() > FLAT * max(sizes.max(), 1.0)

@@ -133,7 +133,7 @@ class SwitchingPoint:
 class Leftover:
     """Group of neighboring smallest cells that may contain an equilibrium."""
 
-    centres: Floats
+    centers: Floats
     """(n, 2) centers of the cells in W, m."""
     strengths: Floats
     """(n,) magnitude of the force at each center, N."""
@@ -345,20 +345,20 @@ class CellSearch:
         ends = np.cumsum(np.bincount(group, minlength=count))[:-1]
         return [self._group(cells[part], edge) for part in np.split(order, ends)]
 
-    def _group(self, centres: Floats, edge: float) -> Leftover:
+    def _group(self, centers: Floats, edge: float) -> Leftover:
         offsets = edge / 2.0 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        corners = (centres[:, None, :] + offsets).reshape(-1, 2)
+        corners = (centers[:, None, :] + offsets).reshape(-1, 2)
         forces = self.forces(corners).reshape(-1, 4, 2)
         angles = np.arctan2(forces[..., 1], forces[..., 0])
         steps = np.angle(np.exp(1j * (np.roll(angles, -1, axis=1) - angles)))
-        ordered = np.sort(self._vectors(centres)[1], axis=0)
-        switches = np.zeros(len(centres), dtype=bool)
+        ordered = np.sort(self._vectors(centers)[1], axis=0)
+        switches = np.zeros(len(centers), dtype=bool)
         if self._slots < len(ordered):
             apart = ordered[self._slots] - ordered[self._slots - 1]
             switches = apart <= np.sqrt(2.0) * edge
         return Leftover(
-            centres=centres,
-            strengths=np.linalg.norm(self.forces(centres), axis=1),
+            centers=centers,
+            strengths=np.linalg.norm(self.forces(centers), axis=1),
             winding=np.rint(steps.sum(axis=1) / (2 * np.pi)).astype(np.int64),
             switches=switches,
         )
@@ -369,7 +369,7 @@ class CellSearch:
         With ``aggregation: sum`` the list is empty, because the force then switches
         between sums.
         """
-        starts = group.centres[group.switches]
+        starts = group.centers[group.switches]
         if not len(starts) or self._slots > 1:
             return []
         starts = starts[:: -(-len(starts) // _MOST_STARTS)]

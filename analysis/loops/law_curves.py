@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analysis.loops.radial_law import radial_law
-from analysis.report.palette import SERIES_COLOURS
+from analysis.report.palette import SERIES_COLORS
 from diagrams.scenario.scenario import Scenario
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 #: Distances of the curves, m.
 DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
@@ -28,8 +28,8 @@ SPEEDS_M_S = np.linspace(-1.0, 1.0, 201)
 AT_DISTANCE_M = 0.4
 #: Color and title of each law of the package, by name.
 LAW_STYLES = {
-    law.name: (law.colour or colour, law.label)
-    for law, colour in zip(LAWS.values(), cycle(SERIES_COLOURS), strict=False)
+    law.name: (law.color or color, law.label)
+    for law, color in zip(LAWS.values(), cycle(SERIES_COLORS), strict=False)
 }
 
 
@@ -82,12 +82,12 @@ def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
     figure = Figure(figsize=(10.0, 4.0), layout="constrained")
     by_distance, by_speed = figure.subplots(1, 2)
     for curve in curves:
-        colour, title = LAW_STYLES.get(curve.law, (None, curve.law))
+        color, title = LAW_STYLES.get(curve.law, (None, curve.law))
         if curve.velocity_term == "printed":
-            by_distance.plot(curve.distance_m, curve.push_n, color=colour, label=title)
-            by_speed.plot(curve.speed_m_s, curve.force_n, color=colour, label=title)
+            by_distance.plot(curve.distance_m, curve.push_n, color=color, label=title)
+            by_speed.plot(curve.speed_m_s, curve.force_n, color=color, label=title)
         else:
-            by_speed.plot(curve.speed_m_s, curve.force_n, "--", color=colour)
+            by_speed.plot(curve.speed_m_s, curve.force_n, "--", color=color)
     by_distance.set_xlabel("distance c (m)")
     by_distance.set_ylabel("force away from the obstacle (N)")
     by_distance.set_title("the obstacle at rest")

@@ -27,14 +27,14 @@ from analysis.loops.robustness import (
     PoleSensitivity,
 )
 from analysis.loops.step_response import StepCheck
-from analysis.report.palette import COLOURS, draw_grid
+from analysis.report.palette import COLORS, draw_grid
 from systems.world.geometry import rectangle_corners
 
 #: Marker, color and title of each kind of equilibrium.
 _KINDS = {
-    "sink": ("o", COLOURS["robot"], "sink"),
-    "saddle": ("X", COLOURS["echo"], "saddle"),
-    "source": ("^", COLOURS["source"], "source"),
+    "sink": ("o", COLORS["robot"], "sink"),
+    "saddle": ("X", COLORS["echo"], "saddle"),
+    "source": ("^", COLORS["source"], "source"),
 }
 
 
@@ -51,16 +51,16 @@ def plot_equilibria(search: EquilibriumSearch) -> Figure:
         arrowsize=0.7, density=1.6,
     )  # fmt: skip
     for name, body in search.scenario.bodies().items():
-        colour = COLOURS["source" if name == "source" else "obstacle"]
+        color = COLORS["source" if name == "source" else "obstacle"]
         corners = rectangle_corners(body.rectangle(0.0))
-        axes.add_patch(Polygon(corners, facecolor=colour, alpha=0.8))
+        axes.add_patch(Polygon(corners, facecolor=color, alpha=0.8))
     drawn = set()
     for point in search.points:
-        marker, colour, title = _KINDS[point.kind]
+        marker, color, title = _KINDS[point.kind]
         label = None if title in drawn else title
         drawn.add(title)
         axes.plot(
-            *point.p_WP, marker, color=colour, markersize=9, label=label,
+            *point.p_WP, marker, color=color, markersize=9, label=label,
             markeredgecolor="black", linestyle="none", zorder=4,
         )  # fmt: skip
         if point.continuum:
@@ -69,14 +69,14 @@ def plot_equilibria(search: EquilibriumSearch) -> Figure:
             radius = point.source_distance_m
             axes.plot(
                 px + radius * np.cos(angle), py + radius * np.sin(angle), "--",
-                color=colour, linewidth=1.0, label="continuum",
+                color=color, linewidth=1.0, label="continuum",
             )  # fmt: skip
     for switch in search.switching:
         title = "attractive switching point" if switch.attractive else "switching point"
         label = None if title in drawn else title
         drawn.add(title)
         axes.plot(
-            *switch.p_WP, "s", color=COLOURS["estimate"], markersize=7, zorder=4,
+            *switch.p_WP, "s", color=COLORS["estimate"], markersize=7, zorder=4,
             markeredgecolor="black", linestyle="none", label=label,
             fillstyle="full" if switch.attractive else "none",
         )  # fmt: skip
@@ -94,13 +94,13 @@ def plot_step(check: StepCheck) -> Figure:
     """Plots the distance from the source after a step: predicted and simulated."""
     figure = Figure(figsize=(7.5, 3.8), layout="constrained")
     axes = figure.subplots()
-    for distance, line, colour, label in (
+    for distance, line, color, label in (
         (check.full_m, "-", "echo", "the scenario's sensors"),
         (check.ideal_m, "-", "robot", "exact sensors"),
         (check.predicted_m, "--", "source", "linear model"),
     ):
         if distance is not None:
-            axes.plot(check.time_s, distance, line, color=COLOURS[colour], label=label)
+            axes.plot(check.time_s, distance, line, color=COLORS[color], label=label)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("distance of P from the source (m)")
     axes.set_title(
@@ -137,19 +137,19 @@ def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     lowest = -360.0
-    for loop, colour in zip(loops, cycle(_CYCLE), strict=False):
+    for loop, color in zip(loops, cycle(_CYCLE), strict=False):
         omega, L = loop.response.omega, loop.response.L
-        upper.semilogx(omega, _size_db(L), color=colour, label=loop.name)
+        upper.semilogx(omega, _size_db(L), color=color, label=loop.name)
         phase = _phase_deg(loop.response)
         lowest = min(lowest, float(phase.min()))
-        lower.semilogx(omega, phase, color=colour)
+        lower.semilogx(omega, phase, color=color)
         if math.isfinite(loop.phase_margin_deg):
             at = loop.crossover_rad_s
             reached = float(np.interp(at, omega, phase))
-            upper.plot(at, 0.0, "o", color=colour, markersize=5)
-            lower.plot([at, at], [-180.0, reached], color=colour, linewidth=2.5)
-    upper.axhline(0.0, color=COLOURS["empty"], linewidth=0.8)
-    lower.axhline(-180.0, color=COLOURS["empty"], linewidth=0.8)
+            upper.plot(at, 0.0, "o", color=color, markersize=5)
+            lower.plot([at, at], [-180.0, reached], color=color, linewidth=2.5)
+    upper.axhline(0.0, color=COLORS["empty"], linewidth=0.8)
+    lower.axhline(-180.0, color=COLORS["empty"], linewidth=0.8)
     upper.set_ylabel("|L| (dB)")
     upper.set_ylim(-80.0, 80.0)
     upper.set_yticks(np.arange(-80.0, 81.0, 20.0))
@@ -171,13 +171,13 @@ def plot_nyquist(loops: Sequence[LoopMargins]) -> Figure:
         L = loop.response.L
         axes.plot(L.real, L.imag, color=_CYCLE[0], label="L")
         axes.plot(L.real, -L.imag, color=_CYCLE[0], linewidth=0.7, linestyle=":")
-        axes.plot(-1.0, 0.0, "+", color=COLOURS["source"], markersize=9)
+        axes.plot(-1.0, 0.0, "+", color=COLORS["source"], markersize=9)
         low, high = _disk_ends(loop.disk.alpha)
         axes.add_patch(
             Circle(
                 ((low + high) / 2.0, 0.0),
                 (high - low) / 2.0,
-                facecolor=COLOURS["source"],
+                facecolor=COLORS["source"],
                 alpha=0.25,
                 label=f"disk, $\\alpha$ = {loop.disk.alpha:.2f}",
             )
@@ -230,11 +230,11 @@ def plot_nichols(loops: Sequence[LoopMargins]) -> Figure:
     figure = Figure(figsize=(7.5, 5.6), layout="constrained")
     axes = figure.subplots()
     _contours(axes)
-    for loop, colour in zip(loops, cycle(_CYCLE), strict=False):
+    for loop, color in zip(loops, cycle(_CYCLE), strict=False):
         L = loop.response.L
         phase = _phase_deg(loop.response)
-        axes.plot(phase, _size_db(L), color=colour, label=loop.name)
-    axes.plot(-180.0, 0.0, "+", color=COLOURS["source"], markersize=11)
+        axes.plot(phase, _size_db(L), color=color, label=loop.name)
+    axes.plot(-180.0, 0.0, "+", color=COLORS["source"], markersize=11)
     axes.set_xlim(-360.0, 0.0)
     axes.set_ylim(-40.0, 40.0)
     axes.set_xticks(np.arange(-360.0, 1.0, 45.0))
@@ -275,7 +275,7 @@ def plot_gang_of_four(gang: GangOfFour) -> Figure:
         size = np.abs(getattr(gang, name))
         axes.loglog(gang.omega, np.maximum(size, 1e-9), color=_CYCLE[0])
         peak = int(size.argmax())
-        axes.plot(gang.omega[peak], size[peak], "o", color=COLOURS["source"])
+        axes.plot(gang.omega[peak], size[peak], "o", color=COLORS["source"])
         # The label is on the left of a peak that is near the right border.
         at_border = gang.omega[peak] > 0.3 * gang.omega[-1]
         axes.annotate(
@@ -302,10 +302,10 @@ def plot_pole_cloud(cloud: PoleCloud) -> Figure:
     """Plots the poles ln(z)/T of all samples, with the nominal and the worst case."""
     figure = Figure(figsize=(8.0, 4.4), layout="constrained")
     axes = figure.subplots()
-    for z, marker, size, colour, label in (
-        (np.concatenate(cloud.poles), ".", 3, COLOURS["left"], "random values"),
-        (cloud.worst_poles, "x", 8, COLOURS["source"], "worst case"),
-        (cloud.nominal_poles, "o", 6, COLOURS["robot"], "nominal"),
+    for z, marker, size, color, label in (
+        (np.concatenate(cloud.poles), ".", 3, COLORS["left"], "random values"),
+        (cloud.worst_poles, "x", 8, COLORS["source"], "worst case"),
+        (cloud.nominal_poles, "o", 6, COLORS["robot"], "nominal"),
     ):
         poles = s_plane(z, cloud.period_s)
         slow = poles[np.abs(poles) < _SLOW_1_S]
@@ -314,7 +314,7 @@ def plot_pole_cloud(cloud: PoleCloud) -> Figure:
             slow.imag,
             marker,
             markersize=size,
-            color=colour,
+            color=color,
             fillstyle="full" if marker == "." else "none",
             label=label,
         )
@@ -343,8 +343,8 @@ def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
         (right, "imag", "frequency: change of the imaginary part (rad/s)"),
     ):
         changes = [getattr(row.per_interval, part) for row in ordered]
-        colours = [COLOURS["source" if x > 0 else "robot"] for x in changes]
-        axes.barh(names, changes, color=colours)
+        colors = [COLORS["source" if x > 0 else "robot"] for x in changes]
+        axes.barh(names, changes, color=colors)
         axes.axvline(0.0, color="black", linewidth=0.8)
         axes.set_title(title, fontsize=10)
         draw_grid(axes, "x")

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from analysis.loops.radial_law import radial_law
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 #: Laws whose gains the design chooses, by name, with their tuning.
 DESIGNED_LAWS = {
@@ -50,18 +50,18 @@ def kinetic_energy(scenario: Scenario) -> float:
     return 0.5 * robot.mass_kg * robot.top_speed_m_s**2
 
 
-def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
+def net_barrier(push: Push, scenario: Scenario, meters_to_go: float) -> float:
     """Returns the largest energy that a robot loses on its way to an obstacle, J.
 
     Where the push exceeds the pull of the attraction, the robot loses kinetic energy.
     The result is the largest loss between two points of the approach, which ends at the
     least distance that the sensors measure. If this loss is at least the kinetic energy
     of top speed, the robot stops, because it cannot be faster than top speed. The
-    attraction is zero at ``metres_to_go`` behind the surface of the obstacle.
+    attraction is zero at ``meters_to_go`` behind the surface of the obstacle.
     """
     c, forces = sampled_push(push, scenario)
     return largest_rise(
-        forces - scenario.follower.attraction.stiffness_n_m * (c + metres_to_go)
+        forces - scenario.follower.attraction.stiffness_n_m * (c + meters_to_go)
     )
 
 
@@ -82,7 +82,7 @@ def largest_rise(net: NDArray[np.float64]) -> float:
     return float(np.max(potential - np.minimum.accumulate(potential)))
 
 
-def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
+def barrier_from_reach_n_m(scenario: Scenario, meters_to_go: float) -> float:
     """Returns the K_0, N/m, with which the conventional law stops a robot.
 
     The law acts as a spring of stiffness K_0 within its reach rho_0. Within this reach,
@@ -92,11 +92,11 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
     - The kinetic energy at top speed, which the robot has at the distance rho_0.
     - The work of the attraction from the distance rho_0 to the obstacle.
 
-    The attraction is zero at ``metres_to_go`` behind the surface of the obstacle.
+    The attraction is zero at ``meters_to_go`` behind the surface of the obstacle.
     """
     K_r = scenario.follower.attraction.stiffness_n_m
     reach = scenario.follower.laws.conventional.reach_m
-    work = K_r / 2.0 * ((metres_to_go + reach) ** 2 - metres_to_go**2)
+    work = K_r / 2.0 * ((meters_to_go + reach) ** 2 - meters_to_go**2)
     return 2.0 * (kinetic_energy(scenario) + work) / reach**2
 
 

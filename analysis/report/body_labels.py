@@ -14,7 +14,7 @@ from matplotlib.text import Annotation
 from matplotlib.textpath import TextPath
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.report.palette import text_colour
+from analysis.report.palette import text_color
 
 _POINTS_PER_INCH = 72.0
 #: _GAPS_PT: possible gaps between a body and its label, pt.
@@ -52,7 +52,7 @@ class BodyLabel(Annotation):
             (x + 0.5 * width * unit[0], y + 0.5 * width * unit[1]),
             xytext=(9.0 * unit[0], 7.0 * unit[1]),
             textcoords="offset points",
-            color=text_colour(color),
+            color=text_color(color),
             fontsize=8,
             ha="center",
             va="center",

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 #: darkened, so that lines have a contrast of 3 to 1 on white (WCAG 2.2, 1.4.11).
 #: Orange became brown, because people who see no green would confuse a darker orange
 #: with vermilion. "sound" is light, because it is drawn below other things.
-COLOURS = {
+COLORS = {
     "robot": "#0072B2",
     "source": "#D55E00",
     "estimate": "#A8498A",
@@ -37,7 +37,7 @@ COLOURS = {
     "lessened": "#A86B00",
 }
 #: Colors of several robots, in order.
-ROBOT_COLOURS = (
+ROBOT_COLORS = (
     "#0072B2",
     "#009E73",
     "#AA4499",
@@ -50,8 +50,8 @@ ROBOT_COLOURS = (
 
 #: Colors of curves that belong to none of these things, for example to laws, in order.
 #: The first one is gray, for driving without a law of avoidance.
-SERIES_COLOURS = (
-    COLOURS["empty"],
+SERIES_COLORS = (
+    COLORS["empty"],
     "#D55E00",
     "#0072B2",
     "#7A5200",
@@ -63,7 +63,7 @@ SERIES_COLOURS = (
 )
 
 
-def luminance(colour: Any) -> float:
+def luminance(color: Any) -> float:
     """Computes the relative luminance of a color: 0 for black, 1 for white (WCAG 2.2).
 
     If the luminance is below 0.18, white text has more contrast than black text. The
@@ -73,7 +73,7 @@ def luminance(colour: Any) -> float:
 
     linear = [
         level / 12.92 if level <= 0.04045 else ((level + 0.055) / 1.055) ** 2.4
-        for level in to_rgb(colour)
+        for level in to_rgb(color)
     ]
     return sum(
         k * level for k, level in zip((0.2126, 0.7152, 0.0722), linear, strict=True)
@@ -90,11 +90,11 @@ def contrast(first: Any, second: Any) -> float:
     return (more + 0.05) / (less + 0.05)
 
 
-def text_colour(colour: Any) -> str:
+def text_color(color: Any) -> str:
     """Darkens a color, if needed, until its contrast on white is 4.5 to 1."""
     from matplotlib.colors import to_hex, to_rgb
 
-    red, green, blue = to_rgb(colour)
+    red, green, blue = to_rgb(color)
     share = 1.0
     while True:
         darker = to_hex((share * red, share * green, share * blue))
@@ -103,14 +103,14 @@ def text_colour(colour: Any) -> str:
         share -= 0.01
 
 
-def faintest(colour: Any) -> float:
+def faintest(color: Any) -> float:
     """Computes the least opacity at which a mark has a contrast of 3 to 1 on white.
 
     The opacity is 1 if even the opaque color is too light.
     """
     from matplotlib.colors import to_rgb
 
-    rgb = to_rgb(colour)
+    rgb = to_rgb(color)
     for percent in range(1, 100):
         thin = [1.0 - percent / 100.0 * (1.0 - level) for level in rgb]
         if contrast(thin, "white") >= 3.05:

@@ -44,10 +44,10 @@ from analysis.report.section import (
 
 _HERE = Path(__file__).parent
 #: CSS variables with the colors of pages, in light mode and in dark mode.
-COLOURS_CSS = (_HERE / "page_colours.css").read_text("utf-8")
+COLORS_CSS = (_HERE / "page_colors.css").read_text("utf-8")
 
 #: Style classes of cells that have a color, by the text of the cell.
-_COLOURS = {
+_COLORS = {
     "pass": "pass",
     "fail": "fail",
     "not applicable": "none",
@@ -157,13 +157,13 @@ def _template() -> Any:
         "kind": lambda item: type(item).__name__,
         "inline": _inline,
         "number": number,
-        "colour": lambda word: _COLOURS.get(word.lower(), ""),
+        "color": lambda word: _COLORS.get(word.lower(), ""),
         "drawing": lambda item, name: figure_svg(item.draw(), name, item.caption),
         "formula": lambda item, name: formula_svg(item.tex, name, item.text),
     }
     environment.globals |= {
         "ZERO": ZERO,
-        "CSS": Markup(COLOURS_CSS + (_HERE / "html_page.css").read_text("utf-8")),
+        "CSS": Markup(COLORS_CSS + (_HERE / "html_page.css").read_text("utf-8")),
         "SCRIPT": Markup((_HERE / "page.js").read_text("utf-8")),
     }
     return environment.get_template("page.html.j2").module

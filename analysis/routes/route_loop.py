@@ -19,7 +19,7 @@ from systems.base.wheel_odometry import WheelOdometry_
 from systems.base.wheel_speed_command import WheelCommand_
 from systems.framework.block import Block, part_of
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import ROUTE_LAWS
+from systems.laws.catalog import ROUTE_LAWS
 from systems.laws.trajectory.trajectory_conventional import (
     TrajectoryImpedanceParameters,
 )

@@ -8,13 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from analysis.report.palette import COLOURS, SERIES_COLOURS, draw_grid
+from analysis.report.palette import COLORS, SERIES_COLORS, draw_grid
 from analysis.routes.adaptation_stability import AdaptationStability
 from analysis.routes.chain_run import BrakedChain, ChainRun
 from analysis.routes.frozen_gains import WELL_DAMPED, FrozenPoint, GainBounds
 from analysis.routes.robot_chain import RobotChain
 
-_LINES = SERIES_COLOURS[1:]
+_LINES = SERIES_COLORS[1:]
 _MARKS = "osD^v"
 #: Largest plotted amplification.
 _HIGHEST = 4.0
@@ -46,7 +46,7 @@ def plot_frozen_poles(points: Sequence[FrozenPoint]) -> Figure:
             [0.0, left],
             [0.0, -sign * slope * left],
             "--",
-            color=COLOURS["empty"],
+            color=COLORS["empty"],
             linewidth=0.8,
             label=f"damping ratio {WELL_DAMPED:g}" if sign > 0.0 else None,
         )
@@ -66,12 +66,12 @@ def plot_gain_bounds(bounds: GainBounds) -> Figure:
     damping = bounds.damping_n_s_m
     for k, late in enumerate(bounds.late_ticks):
         style, when = ("-", "--")[k], ("as built", f"{late} tick late")[k]
-        for values, colour, what in (
+        for values, color, what in (
             (bounds.stable_n_m, _LINES[0], "stable below"),
             (bounds.damped_n_m, _LINES[1], f"damping ratio {WELL_DAMPED:g} below"),
         ):
             shown = np.where(values[:, k] > 0.0, values[:, k], np.nan)
-            axes.loglog(damping, shown, style, color=colour, label=f"{what}, {when}")
+            axes.loglog(damping, shown, style, color=color, label=f"{what}, {when}")
     axes.axvline(
         bounds.closed_damping_n_s_m,
         color="black",
@@ -84,7 +84,7 @@ def plot_gain_bounds(bounds: GainBounds) -> Figure:
             value,
             stiffness,
             "*" if k == 0 else "P",
-            color=COLOURS["sound"],
+            color=COLORS["sound"],
             markeredgecolor="black",
             markersize=14 if k == 0 else 9,
             linestyle="none",
@@ -97,7 +97,7 @@ def plot_gain_bounds(bounds: GainBounds) -> Figure:
                 (low_d, low_k),
                 high_d - low_d,
                 high_k - low_k,
-                facecolor=COLOURS["left"],
+                facecolor=COLORS["left"],
                 alpha=0.35,
                 label="bounds of the adaptation",
             )
@@ -171,7 +171,7 @@ def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
             chain.dampings, chain.peaks_by_damping[:, k], color=_LINES[k], label=name
         )
     right.axvline(
-        chain.damping_n_s_m, color=COLOURS["empty"], linestyle="--", label="current"
+        chain.damping_n_s_m, color=COLORS["empty"], linestyle="--", label="current"
     )
     right.set_ylim(0.8, _HIGHEST)
     right.set_xlabel(f"D (N s/m) at K = {chain.stiffness_n_m:g} N/m")

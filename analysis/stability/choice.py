@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS, LAWS, ROUTE_LAWS
+from systems.laws.catalog import FORCE_LAWS, LAWS, ROUTE_LAWS
 
 
 def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...]:

@@ -37,17 +37,17 @@ def plot_design(study: DesignStudy) -> Figure:
 
 
 def _plot_balance(axes: Axes, study: DesignStudy) -> None:
-    scenario, to_go = study.today.scenario, study.today.metres_to_go
+    scenario, to_go = study.today.scenario, study.today.meters_to_go
     nearest = scenario.follower.ultrasonic.minimum_range_m
     pull = scenario.follower.attraction.stiffness_n_m * (_DISTANCE_M + to_go)
     for law in DESIGNED_LAWS:
-        colour, title = LAW_STYLES[law]
+        color, title = LAW_STYLES[law]
         push = spring(law, scenario)
         force = np.array([push(c) for c in _DISTANCE_M.tolist()])
-        axes.plot(_DISTANCE_M, force, color=colour, label=title)
+        axes.plot(_DISTANCE_M, force, color=color, label=title)
         stops = (force > pull) & (nearest <= _DISTANCE_M)
         axes.fill_between(
-            _DISTANCE_M, pull, force, where=stops.tolist(), color=colour, alpha=0.15
+            _DISTANCE_M, pull, force, where=stops.tolist(), color=color, alpha=0.15
         )
     axes.plot(_DISTANCE_M, pull, color="black", label="attraction's pull")
     axes.axvline(nearest, color="black", linewidth=0.8, linestyle=":")
@@ -76,14 +76,14 @@ def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
         label = f"contact is stable below: echoes {age} old"
         axes.plot(_DAMPING_N_S_M, limits, f"k{line}", label=label)
     for law in DESIGNED_LAWS:
-        colour, title = LAW_STYLES[law]
+        color, title = LAW_STYLES[law]
         stiffness = radial_law(scenario.with_robot(law=law)).stiffest_n_m
         if stiffness < _STIFFNESS_N_M:
             label = f"{title}: {stiffness:.1f} N/m"
-            axes.axhline(stiffness, color=colour, label=label)
+            axes.axhline(stiffness, color=color, label=label)
         else:
             label = f"{title}: {stiffness:.0f} N/m, off the scale"
-            axes.plot([], [], color=colour, label=label)
+            axes.plot([], [], color=color, label=label)
     axes.axvline(attraction.damping_n_s_m, color="black", linewidth=0.8, linestyle=":")
     axes.set_xlim(_DAMPING_N_S_M[0], _DAMPING_N_S_M[-1])
     axes.set_ylim(0.0, _STIFFNESS_N_M)

@@ -30,7 +30,7 @@ from analysis.stability.requirements import (
     Requirements,
     allowed_stiffness,
     check_law,
-    metres_to_go,
+    meters_to_go,
 )
 from diagrams import load_scenario, simulate
 from diagrams.scenario.scenario import Scenario
@@ -64,7 +64,7 @@ class Alternative:
     """Overshoot past the follow point after an approach at top speed, m."""
     follow_distance_m: float
     """Least follow distance that leaves room for the overshoot, m."""
-    metres_to_go: float
+    meters_to_go: float
     """Distance from an obstacle to the point of rest behind it, m."""
     allowed_stiffness_n_m: float
     """Largest stiffness of a push that is stable in contact with late echoes, N/m."""
@@ -82,7 +82,7 @@ class Alternative:
 class BarrierRow:
     """K_0 of the conventional law that stops P, for one position of the target."""
 
-    metres_to_go: float
+    meters_to_go: float
     """Distance of the point of rest behind the obstacle, m."""
     stiffness_n_m: float
     """K_0 if the speed is limited during the whole approach, N/m."""
@@ -170,7 +170,7 @@ def _alternative(
         figures=gain_figures(scenario, requirements),
         overshoot_m=overshoot,
         follow_distance_m=follow_distance(scenario, requirements, overshoot),
-        metres_to_go=metres_to_go(scenario, requirements),
+        meters_to_go=meters_to_go(scenario, requirements),
         allowed_stiffness_n_m=allowed_stiffness(scenario, requirements),
         laws=tuple(check_law(scenario, law, requirements) for law in DESIGNED_LAWS),
         jams=tuple(jam_runs(scenario, tuple(DESIGNED_LAWS), progress=progress)),

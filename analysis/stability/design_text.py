@@ -25,7 +25,7 @@ def design_text(study: DesignStudy) -> str:
         ),
     ]
     lines += [
-        f"  {row.metres_to_go:3.1f} m behind  {row.stiffness_n_m:5.1f}   "
+        f"  {row.meters_to_go:3.1f} m behind  {row.stiffness_n_m:5.1f}   "
         f"({row.stiffness_from_reach_n_m:.1f} without the speed limit)"
         for row in study.barriers
     ]
@@ -52,7 +52,7 @@ def _alternative_lines(alternative: Alternative) -> list[str]:
         f"  damping ratio {alternative.figures.damping_ratio:.2f}, phase margin "
         f"{alternative.figures.phase_margin_deg:.0f} deg, lag "
         f"{alternative.figures.following_lag_m:.2f} m, overshoot "
-        f"{alternative.overshoot_m:.2f} m, target {alternative.metres_to_go:.1f} m "
+        f"{alternative.overshoot_m:.2f} m, target {alternative.meters_to_go:.1f} m "
         "behind the obstacle"
     )
     lines = [gains, figures]

@@ -30,14 +30,14 @@ from analysis.loops.radial_law import radial_law
 from analysis.stability.requirements import (
     Requirements,
     allowed_stiffness,
-    metres_to_go,
+    meters_to_go,
     with_gains,
 )
 from diagrams.scenario.participants import LawGains
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.active import matched_share
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 #: Gains are rounded to this number of significant figures.
 _FIGURES = 3
@@ -78,7 +78,7 @@ def gain_for_barrier(
     to which the push is proportional. ``also`` has other gains of the law as multiples
     of this gain. Raises InputError if no gain from 1e-3 to 1e5 stops the robot.
     """
-    to_go, energy = metres_to_go(scenario, requirements), kinetic_energy(scenario)
+    to_go, energy = meters_to_go(scenario, requirements), kinetic_energy(scenario)
 
     unit = with_gains(scenario, law, **{field: 1.0}, **also)
     c, push = sampled_push(spring(law, unit), scenario)

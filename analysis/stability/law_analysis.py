@@ -136,7 +136,7 @@ class LawAnalysis:
         return failure_text(error)
 
 
-def analyse_law(
+def analyze_law(
     scenario: Scenario,
     parts: Sequence[Part[Any]],
     *,

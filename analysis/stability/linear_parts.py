@@ -12,7 +12,7 @@ import numpy as np
 from analysis.loops.equilibria import EquilibriumSearch, find_equilibria
 from analysis.loops.linear_models import LinearModel, Mode
 from analysis.loops.linear_plots import plot_equilibria, plot_step
-from analysis.loops.linearisation import (
+from analysis.loops.linearization import (
     GradientCheck,
     RouteComparison,
     check_gradient,

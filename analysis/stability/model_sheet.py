@@ -17,7 +17,7 @@ from diagrams.scenario.participants import Follower, Router
 from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
 from systems.heading.heading_controller import TURNING_BEYOND_DEG
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 from systems.laws.law import Equation
 from systems.laws.parameters import ImpedanceParameters
 

@@ -35,7 +35,7 @@ from analysis.report.section import (
 from analysis.stability.law_analysis import LawAnalysis
 from analysis.stability.model_sheet import ModelSheet, ParameterRow
 from diagrams import write_scenario
-from systems.laws.catalogue import law_title
+from systems.laws.catalog import law_title
 from systems.laws.law import Equation
 
 

@@ -164,7 +164,7 @@ def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
     return scenario.with_robot(laws=laws)
 
 
-def metres_to_go(scenario: Scenario, requirements: Requirements) -> float:
+def meters_to_go(scenario: Scenario, requirements: Requirements) -> float:
     """Returns the distance from an obstacle to the follow point behind it, m.
 
     The obstacle is at the distance rho_0 ahead of the robot, where rho_0 is the reach
@@ -199,10 +199,10 @@ def check_law(scenario: Scenario, law: str, requirements: Requirements) -> LawDe
     """Checks the gains of a law in a scenario against five requirements.
 
     Raises InputError if the law is not one of ``DESIGNED_LAWS``, or if the follow
-    distance is too long; see ``metres_to_go``.
+    distance is too long; see ``meters_to_go``.
     """
     push = spring(law, scenario)
-    to_go = metres_to_go(scenario, requirements)
+    to_go = meters_to_go(scenario, requirements)
     barrier, energy = net_barrier(push, scenario, to_go), kinetic_energy(scenario)
     slope = radial_law(scenario.with_robot(law=law)).stiffest_n_m
     allowed = allowed_stiffness(scenario, requirements)

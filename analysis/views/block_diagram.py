@@ -28,7 +28,7 @@ FILLS: dict[Stage, str] = {
 }
 #: Colors of the wires, dark enough for a white page. All wires from one block have
 #: the same color.
-WIRE_COLOURS = (
+WIRE_COLORS = (
     "#0072B2",
     "#D55E00",
     "#009E73",
@@ -122,10 +122,10 @@ def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
         f'viewBox="0 0 {width} {height}" font-family="Helvetica, Arial, sans-serif">'
     )
     parts = [head, '<rect width="100%" height="100%" fill="white"/>']
-    colours = dict(zip(layout.boxes, cycle(WIRE_COLOURS), strict=False))
-    parts += [_direct(layout, w, colours[w.source]) for w in layout.direct]
+    colors = dict(zip(layout.boxes, cycle(WIRE_COLORS), strict=False))
+    parts += [_direct(layout, w, colors[w.source]) for w in layout.direct]
     for key, along in layout.bus.items():
-        parts += [_along_bus(layout, key, wire, colours[key[0]]) for wire in along]
+        parts += [_along_bus(layout, key, wire, colors[key[0]]) for wire in along]
     read = {(w.source, w.output) for w in connections}
     parts += [_drawn(box, read) for box in layout.boxes.values()]
     return "\n".join([*parts, "</svg>", ""])
@@ -254,7 +254,7 @@ def _set_tracks(layout: _Layout) -> None:
     layout.width = x + MARGIN
 
 
-def _direct(layout: _Layout, wire: Wire, colour: str) -> str:
+def _direct(layout: _Layout, wire: Wire, color: str) -> str:
     x0, y0 = layout.boxes[wire.source].port(wire.output, output=True)
     x1, y1 = layout.boxes[wire.target].port(wire.input, output=False)
     bend = max(20.0, 0.5 * (x1 - x0))
@@ -262,10 +262,10 @@ def _direct(layout: _Layout, wire: Wire, colour: str) -> str:
         f"M{x0:.1f},{y0:.1f} C{x0 + bend:.1f},{y0:.1f} "
         f"{x1 - bend:.1f},{y1:.1f} {x1:.1f},{y1:.1f}"
     )
-    return _wire(wire, path, (x1, y1), colour)
+    return _wire(wire, path, (x1, y1), color)
 
 
-def _along_bus(layout: _Layout, key: tuple[str, str], wire: Wire, colour: str) -> str:
+def _along_bus(layout: _Layout, key: tuple[str, str], wire: Wire, color: str) -> str:
     source, target = layout.boxes[wire.source], layout.boxes[wire.target]
     x0, y0 = source.port(wire.output, output=True)
     x1, y1 = target.port(wire.input, output=False)
@@ -273,16 +273,16 @@ def _along_bus(layout: _Layout, key: tuple[str, str], wire: Wire, colour: str) -
     arrive = layout.track_x[target.column, key]
     y = layout.bus_y[key]
     path = f"M{x0:.1f},{y0:.1f} H{leave:.1f} V{y:.1f} H{arrive:.1f} V{y1:.1f} H{x1:.1f}"
-    return _wire(wire, path, (x1, y1), colour)
+    return _wire(wire, path, (x1, y1), color)
 
 
-def _wire(wire: Wire, path: str, end: tuple[float, float], colour: str) -> str:
+def _wire(wire: Wire, path: str, end: tuple[float, float], color: str) -> str:
     name = f"{wire.source}.{wire.output} to {wire.target}.{wire.input}"
     return (
         f'<g class="wire"><title>{escape(name)}</title>'
-        f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="1.5" '
+        f'<path d="{path}" fill="none" stroke="{color}" stroke-width="1.5" '
         'stroke-linejoin="round"/>'
-        f'<path d="M{end[0]:.1f},{end[1]:.1f} l-8,-4 v8 z" fill="{colour}"/></g>'
+        f'<path d="M{end[0]:.1f},{end[1]:.1f} l-8,-4 v8 z" fill="{color}"/></g>'
     )
 
 
@@ -302,8 +302,8 @@ def _drawn(box: _Box, read: set[tuple[str, str]]) -> str:
         parts.append(_text(x + 6, y + 4, escape(name), 12, "start", "black"))
     for name in box.outputs:
         x, y = box.port(name, output=True)
-        colour = "black" if (box.name, name) in read else "#6B6B6B"
-        parts.append(_text(x - 6, y + 4, escape(name), 12, "end", colour))
+        color = "black" if (box.name, name) in read else "#6B6B6B"
+        parts.append(_text(x - 6, y + 4, escape(name), 12, "end", color))
     return "".join([*parts, "</g>"])
 
 
@@ -313,14 +313,14 @@ def _text(
     text: str,
     size: int,
     anchor: str,
-    colour: str,
+    color: str,
     *,
     bold: bool = False,
 ) -> str:
     weight = ' font-weight="bold"' if bold else ""
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}" '
-        f'fill="{colour}"{weight}>{text}</text>'
+        f'fill="{color}"{weight}>{text}</text>'
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
 from analysis.views.bursts import heard_bursts
 from diagrams import RunResult
@@ -37,7 +37,7 @@ class Curve(NamedTuple):
     """(n,) times, s."""
     y: NDArray[np.float64]
     """(n,) values, in the unit of the panel. NaN is a gap."""
-    colour: str
+    color: str
     """Color, as a hexadecimal string."""
     style: Literal["line", "dashes", "dots", "steps", "mark"] = "line"
     """With ``steps``, each value holds from its time on. ``mark`` is a single point."""
@@ -51,7 +51,7 @@ class Shade(NamedTuple):
     label: str
     spans: list[tuple[float, float]]
     """Start and end of each interval, s."""
-    colour: str
+    color: str
     alpha: float
     """Opacity, 0 to 1."""
     between: tuple[float, float]
@@ -163,7 +163,7 @@ def _thinned(curve: Curve) -> dict[str, Any]:
         t, y = t[::step], y[::step]
     return {
         "label": curve.label,
-        "colour": curve.colour,
+        "color": curve.color,
         "style": style,
         "t": _short(t, 3),
         "values": _short(y, 4),
@@ -206,7 +206,7 @@ def _spans(result: RunResult, where: NDArray[np.bool_]) -> list[tuple[float, flo
 def _range(result: RunResult) -> Panel:
     columns, follow = result.columns, result.scenario.only.follow_distance_m
     true = columns["source_range_true"]
-    curves = [Curve("true", result.time, true, COLOURS["source"])]
+    curves = [Curve("true", result.time, true, COLORS["source"])]
     if "source_range" in columns:
         curves.append(_heard(result, "estimated", columns["source_range"], 2.0))
     curves.append(_level_line(result, "follow distance", follow))
@@ -218,15 +218,15 @@ def _range(result: RunResult) -> Panel:
 def _heard(
     result: RunResult, label: str, values: NDArray[np.float64], width: float = 1.5
 ) -> Curve:
-    return Curve(label, result.time, values, COLOURS["estimate"], "dots", width)
+    return Curve(label, result.time, values, COLORS["estimate"], "dots", width)
 
 
 def _goal(result: RunResult) -> Panel:
     columns, time = result.columns, result.time
     off = np.hypot(*(result.vector("target") - result.vector("p_WP")))
     curves = [
-        Curve("to the goal", time, columns["source_range_true"], COLOURS["source"]),
-        Curve("to the target", time, off, COLOURS["robot"]),
+        Curve("to the goal", time, columns["source_range_true"], COLORS["source"]),
+        Curve("to the target", time, off, COLORS["robot"]),
     ]
     replans = time[1:][np.diff(columns["replans"]) != 0.0]
     instants = tuple(replans.tolist())
@@ -236,7 +236,7 @@ def _goal(result: RunResult) -> Panel:
 def _bearing(result: RunResult) -> Panel:
     columns, time = result.columns, result.time
     true = _without_jumps(np.degrees(columns["source_bearing_true"]))
-    curves = [Curve("true", time, true, COLOURS["source"])]
+    curves = [Curve("true", time, true, COLORS["source"])]
     if "source_bearing" in columns:
         heard = np.degrees(columns["source_bearing"])
         curves.append(_heard(result, "estimated", heard, 2.0))
@@ -246,7 +246,7 @@ def _bearing(result: RunResult) -> Panel:
 def _forces(result: RunResult) -> Panel:
     curves = [
         Curve(
-            name, result.time, np.hypot(*result.vector(name)), COLOURS[name], width=1.2
+            name, result.time, np.hypot(*result.vector(name)), COLORS[name], width=1.2
         )
         for name in ("attraction", "repulsion")
     ]
@@ -255,8 +255,8 @@ def _forces(result: RunResult) -> Panel:
 
 def _gains(result: RunResult) -> Panel:
     curves = [
-        Curve(label, result.time, result.columns[name], COLOURS[colour])
-        for name, label, colour in (
+        Curve(label, result.time, result.columns[name], COLORS[color])
+        for name, label, color in (
             ("stiffness", "K (N/m)", "source"),
             ("damping", "D (N s/m)", "robot"),
             ("contact_stiffness", "K_e (N/m)", "repulsion"),
@@ -274,12 +274,12 @@ def _speeds(result: RunResult) -> Panel:
             f"{side} wheel, command",
             time,
             columns[f"wheel_speed_{side}"] * robot.wheel_radius_m,
-            COLOURS[side],
+            COLORS[side],
             width=1.0,
         )
         for side in ("left", "right")
     ]
-    curves.append(Curve("robot, forward", time, forward, COLOURS["robot"]))
+    curves.append(Curve("robot, forward", time, forward, COLORS["robot"]))
     if "wanted_speed" in columns:
         curves.append(_wanted(time, columns["wanted_speed"]))
     return Panel("speed", "m/s", curves)
@@ -288,7 +288,7 @@ def _speeds(result: RunResult) -> Panel:
 def _turning(result: RunResult) -> Panel:
     columns, time = result.columns, result.time
     rate = np.degrees(columns["omega_WB"])
-    curves = [Curve("robot, to the left", time, rate, COLOURS["robot"])]
+    curves = [Curve("robot, to the left", time, rate, COLORS["robot"])]
     if "wanted_turn" in columns:
         curves.append(_wanted(time, np.degrees(columns["wanted_turn"])))
     return Panel("turn rate", "deg/s", [*curves, _zero(result)])
@@ -296,7 +296,7 @@ def _turning(result: RunResult) -> Panel:
 
 def _wanted(time: NDArray[np.float64], values: NDArray[np.float64]) -> Curve:
     """Returns the command of the law, which a guard may reduce."""
-    return Curve("wanted by the law", time, values, COLOURS["law"], "dashes", 1.0)
+    return Curve("wanted by the law", time, values, COLORS["law"], "dashes", 1.0)
 
 
 def _guard_actions(result: RunResult) -> Panel:
@@ -305,13 +305,13 @@ def _guard_actions(result: RunResult) -> Panel:
         Shade(
             f"{name}: {100.0 * np.mean(actions == number):.0f} %",
             _spans(result, actions == number),
-            COLOURS["source" if number else "empty"],
+            COLORS["source" if number else "empty"],
             1.0,
             (number - 0.35, number + 0.35),
         )
         for number, name in enumerate(GUARD_ACTIONS)
     )
-    did = Curve("what it did", result.time, actions, COLOURS["robot"], "steps", 0.7)
+    did = Curve("what it did", result.time, actions, COLORS["robot"], "steps", 0.7)
     rows, count = tuple(enumerate(GUARD_ACTIONS)), len(GUARD_ACTIONS)
     # The first action is at the top.
     return Panel(
@@ -321,13 +321,13 @@ def _guard_actions(result: RunResult) -> Panel:
 
 def _guard_distances(result: RunResult) -> Panel:
     time, columns = result.time, result.columns
-    curves = [Curve("to spare", time, columns["guard_distance"], COLOURS["robot"])]
+    curves = [Curve("to spare", time, columns["guard_distance"], COLORS["robot"])]
     guard = result.scenario.only.own_guard
     if guard is not None and guard.obstacle_speed_m_s:
         label, view = "to spare, obstacles in view", columns["guard_view_distance"]
-        curves.append(Curve(label, time, view, COLOURS["left"], width=1.0))
+        curves.append(Curve(label, time, view, COLORS["left"], width=1.0))
     way = columns["guard_stopping_distance"]
-    curves.append(Curve("needed to stop", time, way, COLOURS["source"]))
+    curves.append(Curve("needed to stop", time, way, COLORS["source"]))
     return Panel("guard's distances", "m", [*curves, _zero(result)])
 
 
@@ -340,7 +340,7 @@ def _clearance(result: RunResult, distance: NDArray[np.float64]) -> Panel:
         )
     at, least = result.time[[np.argmin(distance)]], float(np.min(distance))
     curves = [
-        Curve("to nearest body", result.time, distance, COLOURS["obstacle"]),
+        Curve("to nearest body", result.time, distance, COLORS["obstacle"]),
         Curve(f"least: {least:z.2f} m", at, np.array([least]), "#000000", "mark"),
     ]
     return Panel("clearance", "m", curves, low=min(0.0, 1.1 * least))
@@ -350,7 +350,7 @@ def _search_distance(result: RunResult) -> Panel:
     columns, stop = result.columns, result.scenario.stop
     smells = result.scenario.only.searches == "odor"
     away = np.hypot(*(result.vector("p_WB") - result.vector("p_WS")))
-    curves = [Curve("true", result.time, away, COLOURS["source"])]
+    curves = [Curve("true", result.time, away, COLORS["source"])]
     if "source_range" in columns:
         curves.append(_heard(result, "heard", columns["source_range"]))
     found = ODOR_WITHIN_M if smells else stop.sound_within_m
@@ -363,7 +363,7 @@ def _search_bearing(result: RunResult) -> Panel:
     columns = result.columns
     true = _without_jumps(np.degrees(columns["source_bearing_true"]))
     heard = _heard(result, "heard", np.degrees(columns["source_bearing"]))
-    curves = [Curve("true", result.time, true, COLOURS["source"]), heard]
+    curves = [Curve("true", result.time, true, COLORS["source"]), heard]
     return Panel("bearing of source", "deg", curves)
 
 
@@ -372,8 +372,8 @@ def _columns(
 ) -> list[Curve]:
     """Returns columns as curves; ``named`` has name, label and color of each."""
     return [
-        Curve(label, result.time, result.columns[name], COLOURS[colour], width=width)
-        for name, label, colour in named
+        Curve(label, result.time, result.columns[name], COLORS[color], width=width)
+        for name, label, color in named
     ]
 
 
@@ -421,9 +421,9 @@ def _phase(result: RunResult) -> Panel:
     rows = tuple(enumerate(_PHASES[rules]))[1:]
     edges = 0.5, len(rows) + 0.5
     moves = _spans(result, result.columns["move"] > 0.5)
-    shades = [Shade("moves", moves, COLOURS["seen"], 0.2, edges)]
+    shades = [Shade("moves", moves, COLORS["seen"], 0.2, edges)]
     if "listening" in result.columns:
         listens = _spans(result, result.columns["listening"] > 1.5)
-        shades.append(Shade("listens", listens, COLOURS["echo"], 0.3, edges))
+        shades.append(Shade("listens", listens, COLORS["echo"], 0.3, edges))
     curves = _columns(result, 1.2, ("search_phase", "phase", "robot"))
     return Panel("phase", "", curves, *edges, rows, tuple(shades))

@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
 from numpy.typing import NDArray
 
-from analysis.report.palette import COLOURS, draw_grid
+from analysis.report.palette import COLORS, draw_grid
 from analysis.views.framing import run_title, tick_at
 from analysis.views.picture import map_axes
 from analysis.views.scene import (
@@ -70,7 +70,7 @@ class RunFrames:
         draw_grid(self._axes)
         self._axes.set_title(run_title(result), fontsize=11, wrap=True)
         samples = [
-            Polygon(np.zeros((1, 2)), color=layer.colours[0], label=layer.label)
+            Polygon(np.zeros((1, 2)), color=layer.colors[0], label=layer.label)
             for layer in scene.layers
             if isinstance(layer.things[0].shape, _NAMED)
         ]
@@ -125,42 +125,42 @@ class RunFrames:
         tick = tick_at(self._result, time)
         if not thing.visible(tick):
             return []
-        add, plot, colour = self._axes.add_patch, self._axes.plot, thing.colour
+        add, plot, color = self._axes.add_patch, self._axes.plot, thing.color
         pose = thing.pose(tick)
         x, y, theta = pose
 
         def body(length: float, width: float, alpha: float | None = None) -> Artist:
             corners = rectangle_corners(np.array([*pose, length, width]))
-            return add(Polygon(corners, color=colour, alpha=alpha))
+            return add(Polygon(corners, color=color, alpha=alpha))
 
         found: list[Any] = []
         match thing.shape:
             case Walls(corner, (wide, deep, _)):
-                walls = Rectangle(corner, wide, deep, fill=False, ec=colour, lw=4.0)
+                walls = Rectangle(corner, wide, deep, fill=False, ec=color, lw=4.0)
                 found = [add(walls)]
             case Box(length, width) | Touched(length, width):
                 found = [body(length, width)]
             case Trail(line):
                 way = thing.poses[: tick + 1, :2].T
-                found = plot(*way, line, color=colour, lw=1.6 if line == "-" else 1.0)
+                found = plot(*way, line, color=color, lw=1.6 if line == "-" else 1.0)
             case SourceBody(length, width, is_body=True):
                 found = [body(length, width, 0.6)]
             case SourceBody():
-                found = plot(x, y, "D", color=colour, ms=6)
+                found = plot(x, y, "D", color=color, ms=6)
             case Rings(bursts):
-                found = [add(each) for each in circles((x, y), bursts, time, colour)]
+                found = [add(each) for each in circles((x, y), bursts, time, color)]
             case Cone(half_angle, reach, echo):
                 axis, half = math.degrees(theta), math.degrees(half_angle)
-                tint = to_rgb(COLOURS["echo" if echo[tick] else "empty"])
+                tint = to_rgb(COLORS["echo" if echo[tick] else "empty"])
                 ends = axis - half, axis + half
                 found = [add(Wedge((x, y), reach[tick], *ends, fc=(*tint, 0.2)))]
             case RobotBody(own, hears):
                 found = [body(own.length_m, own.width_m, 0.55)]
                 if hears:
                     bar = microphones_W(pose, own).T
-                    found += plot(*bar, "-o", color=colour, ms=3.2, lw=2.0)
+                    found += plot(*bar, "-o", color=color, ms=3.2, lw=2.0)
             case mark:
-                found = plot(x, y, color=colour, ls="none", **_MARKS[type(mark)])
+                found = plot(x, y, color=color, ls="none", **_MARKS[type(mark)])
         return found
 
 
@@ -168,7 +168,7 @@ def circles(
     center: tuple[float, float],
     bursts: list[tuple[float, float]],
     time: float,
-    colour: str,
+    color: str,
 ) -> Iterator[Circle]:
     """Yields the rings around a loudspeaker at a time, s.
 
@@ -179,4 +179,4 @@ def circles(
             radius = RING_M_S * (time - start - left)
             if radius < RING_M:
                 fade = 1.0 - radius / RING_M
-                yield Circle(center, radius, fill=False, ec=colour, lw=1.8, alpha=fade)
+                yield Circle(center, radius, fill=False, ec=color, lw=1.8, alpha=fade)

@@ -58,15 +58,15 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
     large error would enlarge the picture too much.
     """
     scenario, times = result.full_scenario, picture_times(result, most=60)
-    centres = [
+    centers = [
         own.poses(body)[:, :2]
         for own in result.robots.values()
         for body in ("WB", "WS")
     ]
     paths: list[Path] = [each.path() for each in scenario.sources.values()]
     paths += [obstacle.path() for obstacle in scenario.obstacles]
-    centres += [path.poses(times)[:, :2] for path in paths]
-    points = np.concatenate(centres)
+    centers += [path.poses(times)[:, :2] for path in paths]
+    points = np.concatenate(centers)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     if scenario.room is not None:
         corner, wall = scenario.room.corner, 0.2

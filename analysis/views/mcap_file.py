@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from analysis.runs.recorded_run import SCENARIO_FILE, RecordedRun
 from analysis.views.scene import (
     BODY_HEIGHT_M,
@@ -255,10 +255,10 @@ def _body_markers(
 
 
 def _box(
-    frame: str, group: str, size: tuple[float, float, float], colour: str
+    frame: str, group: str, size: tuple[float, float, float], color: str
 ) -> Message:
     at = _pose((0.0, 0.0, 0.0), 0.5 * size[2])
-    return _marker(frame, group, _CUBE, colour, at, _vector(*size))
+    return _marker(frame, group, _CUBE, color, at, _vector(*size))
 
 
 def _edges(room: RoomParameters) -> Message:
@@ -280,12 +280,12 @@ def _marker(
     frame: str,
     group: str,
     kind: int,
-    colour: str,
+    color: str,
     at: Message,
     scale: Message,
     **others: Any,
 ) -> Message:
-    red, green, blue = to_rgb(COLOURS[colour])
+    red, green, blue = to_rgb(COLORS[color])
     return _stamped(
         0.0,
         frame,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from analysis.runs.guarded_motion import guarded_motion
 from analysis.runs.tracked_bodies import tracked_bodies
 from analysis.views.scene import ROBOT_HEIGHT_M, Layer, Scene, Thing
@@ -40,11 +40,11 @@ _EDGES = (
 _LAMP_M = 0.32
 #: Color of the lamp for each state of the robot.
 _LAMPS = {
-    "rests": COLOURS["empty"],
-    "senses": COLOURS["sound"],
-    "moves": COLOURS["robot"],
-    "found": COLOURS["seen"],
-    "gave up": COLOURS["source"],
+    "rests": COLORS["empty"],
+    "senses": COLORS["sound"],
+    "moves": COLORS["robot"],
+    "found": COLORS["seen"],
+    "gave up": COLORS["source"],
 }
 #: Duration of the flash for a radio frame, s.
 _FLASH_S = 0.25
@@ -150,15 +150,15 @@ def _laws(scene: Scene) -> Iterator[Layer]:
         law = _arrow(f"law/{path}", own, commanded_velocity(own), "law", number)
         laws.append(law)
         if robot.searches is None and robot.follow_distance_m:
-            shape, colour = Circle(robot.follow_distance_m), COLOURS["law"]
+            shape, color = Circle(robot.follow_distance_m), COLORS["law"]
             poses, place = own.poses("WS"), f"follow/{path}"
-            laws.append(Thing(place, shape, colour, own.time, poses))
+            laws.append(Thing(place, shape, color, own.time, poses))
             meaning = "path of 1 s at the command; follow distance"
     if forces:
         text = f"attraction and repulsion; an arrow of {m_per_n:g} m is 1 N"
-        colours = COLOURS["attraction"], COLOURS["repulsion"]
-        yield Layer("forces", text, colours, forces)
-    yield Layer("law", meaning, (COLOURS["law"],), laws)
+        colors = COLORS["attraction"], COLORS["repulsion"]
+        yield Layer("forces", text, colors, forces)
+    yield Layer("law", meaning, (COLORS["law"],), laws)
 
 
 def _arrow(
@@ -177,7 +177,7 @@ def _arrow(
     yaw = np.where(last >= 0, np.arctan2(vectors[last, 1], vectors[last, 0]), 0.0)
     poses = np.column_stack([own.vector("p_WP").T[ticks], yaw])
     wide = np.minimum(1.0, lengths / 0.3)
-    arrow = Thing(path, Arrow(), COLOURS[role], times, poses)
+    arrow = Thing(path, Arrow(), COLORS[role], times, poses)
     # The arrows have different heights. Surfaces in one plane would flicker.
     return replace(
         arrow,
@@ -201,19 +201,19 @@ def _guards(scene: Scene) -> Iterator[Layer]:
             replace(
                 circle,
                 path=f"{path}/{edge}",
-                colour=COLOURS[colour],
+                color=COLORS[color],
                 seen=np.isin(motion.actions, numbers),
             )
-            for edge, colour, numbers in _EDGES
+            for edge, color, numbers in _EDGES
         ]
-    colours = COLOURS["passed"], COLOURS["lessened"], COLOURS["hit"]
+    colors = COLORS["passed"], COLORS["lessened"], COLORS["hit"]
     if things:
-        yield Layer("guard", "passed the command, slowed, braked", colours, things)
+        yield Layer("guard", "passed the command, slowed, braked", colors, things)
 
 
 def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
     """Yields a ring per tracked body; its radius is the uncertainty of the position."""
-    things, colour, plans = [], COLOURS["tracked"], False
+    things, color, plans = [], COLORS["tracked"], False
     for name, own in scene.result.robots.items():
         tracked = tracked_bodies(own, times)
         if tracked is None:
@@ -226,7 +226,7 @@ def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
             path = f"tracked/{scene.bodies[name].path}/{k}"
             places = np.where(seen[:, None], tracked.places[:, k], np.nan)
             poses = np.column_stack([places, np.zeros(len(seen))])
-            body = Thing(path, Frame(), colour, tracked.times, poses)
+            body = Thing(path, Frame(), color, tracked.times, poses)
             things.append(body)
             wide = np.minimum(tracked.spreads[:, k], TRACKED_M[-1])
             for least, radius in pairwise((0.0, *TRACKED_M)):
@@ -236,7 +236,7 @@ def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
                         Thing(
                             f"{path}/{radius:g}",
                             Circle(radius),
-                            colour,
+                            color,
                             tracked.times,
                             np.zeros((1, 3)),
                             seen=states,
@@ -245,7 +245,7 @@ def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
                     )
     if plans:
         meaning = "bodies that the robot takes as moving"
-        yield Layer("tracked", meaning, (colour,), things)
+        yield Layer("tracked", meaning, (color,), things)
 
 
 def _lamps(scene: Scene) -> Iterator[Layer]:
@@ -269,7 +269,7 @@ def _lamps(scene: Scene) -> Iterator[Layer]:
         ball = replace(ball, height=_LAMP_M)
         things += [
             replace(
-                ball, path=f"{robot.path}/lamp/{state}", colour=_LAMPS[state], seen=seen
+                ball, path=f"{robot.path}/lamp/{state}", color=_LAMPS[state], seen=seen
             )
             for state, seen in states.items()
         ]
@@ -282,10 +282,10 @@ def _lamps(scene: Scene) -> Iterator[Layer]:
         flash = replace(ball, path=f"{robot.path}/radio", shape=Ball(0.06), alpha=0.8)
         lit = own.time - last < _FLASH_S
         height = _LAMP_M + 0.09
-        things.append(replace(flash, colour="white", height=height, seen=lit))
+        things.append(replace(flash, color="white", height=height, seen=lit))
     text = "gray: at rest; yellow: senses; blue: moves; green: found; orange: gave up"
     if things:
-        yield Layer("lamps", text, (COLOURS["sound"],), things)
+        yield Layer("lamps", text, (COLORS["sound"],), things)
 
 
 def _gains(scene: Scene) -> Iterator[Layer]:
@@ -294,19 +294,19 @@ def _gains(scene: Scene) -> Iterator[Layer]:
     for name, own in scene.result.robots.items():
         if own.scenario.only.kind != "router":
             continue
-        for gain, aside, colour in _GAIN_BARS:
+        for gain, aside, color in _GAIN_BARS:
             if gain not in own.columns or own.columns[gain][0] <= 0.0:
                 continue
             values, robot = own.columns[gain], scene.bodies[name]
             share = np.clip(values / values[0], 0.0, _MOST_HIGH)
             ones = np.ones(len(share))
             place = np.array([[0.0, aside, 0.0]])
-            bar = Thing(f"{robot.path}/{gain}", Bar(), COLOURS[colour], own.time, place)
+            bar = Thing(f"{robot.path}/{gain}", Bar(), COLORS[color], own.time, place)
             scale = np.column_stack([ones, ones, _BAR_M * share])
             things.append(
                 replace(bar, parent=robot, height=ROBOT_HEIGHT_M, scale=scale)
             )
-    colours = COLOURS["source"], COLOURS["robot"], COLOURS["obstacle"]
+    colors = COLORS["source"], COLORS["robot"], COLORS["obstacle"]
     text = "K, D and K_e; a bar of 15 cm is the initial value"
     if things:
-        yield Layer("gains", text, colours, things)
+        yield Layer("gains", text, colors, things)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from analysis.report.body_labels import BodyLabel, spread_labels
 from analysis.report.notebook_figure import NotebookFigure
-from analysis.report.palette import COLOURS, draw_grid, faintest
+from analysis.report.palette import COLORS, draw_grid, faintest
 from analysis.runs.known_space import known_space
 from analysis.views.framing import bounds, picture_times, picture_title, tick_at
 from analysis.views.plume_history import concentration_map, plume_history
@@ -129,7 +129,7 @@ class _Painter:
     ends_only: bool
 
     def __post_init__(self) -> None:
-        self.labelled: set[str] = set()
+        self.labeled: set[str] = set()
         self.result = self.scene.result
 
     @cached_property
@@ -140,9 +140,9 @@ class _Painter:
 
     def once(self, label: str) -> str | None:
         """Returns a label for the first of several equal objects, and then None."""
-        if not label or label in self.labelled:
+        if not label or label in self.labeled:
             return None
-        self.labelled.add(label)
+        self.labeled.add(label)
         return label
 
     def times_of(self, robot: Thing) -> list[float]:
@@ -174,10 +174,10 @@ class _Painter:
     def body(self, rectangle: ArrayLike, **style: Any) -> None:
         self.axes.add_patch(Polygon(rectangle_corners(rectangle), **style))
 
-    def time(self, rectangle: ArrayLike, time: float, colour: str) -> None:
+    def time(self, rectangle: ArrayLike, time: float, color: str) -> None:
         """Writes the time beside a body, on its right until all labels are apart."""
         text = f"{round(time, 1):g} s"
-        self.axes.add_artist(BodyLabel(text, np.asarray(rectangle), colour))
+        self.axes.add_artist(BodyLabel(text, np.asarray(rectangle), color))
 
     def cones(self, thing: Thing, shape: Cone) -> None:
         """Draws a cone at several times, up to the range readings."""
@@ -189,7 +189,7 @@ class _Painter:
         for time in times[:: max(1, math.ceil(len(times) / CONE_INSTANTS))]:
             tick = tick_at(self.result, time)
             echo = bool(shape.echo[tick])
-            colour = to_rgb(COLOURS["echo" if echo else "empty"])
+            color = to_rgb(COLORS["echo" if echo else "empty"])
             x, y, theta = thing.pose(tick)
             axis = math.degrees(theta)
             wedge = Wedge(
@@ -197,8 +197,8 @@ class _Painter:
                 shape.reach[tick],
                 axis - half,
                 axis + half,
-                facecolor=(*colour, 0.2 if echo else 0.07),
-                edgecolor=colour,
+                facecolor=(*color, 0.2 if echo else 0.07),
+                edgecolor=color,
                 linewidth=0.5,
                 label=self.once(
                     "ultrasonic cone with an echo" if echo else "cone without an echo"
@@ -214,9 +214,9 @@ class _Painter:
             return
         free, echoed = known.free[-1], known.middles(known.hits[-1] > 0.0)
         # The color is transparent, because other objects and floors overlap.
-        colour = to_rgba(thing.colour, 0.13)
+        color = to_rgba(thing.color, 0.13)
         layer = np.zeros((*free.T.shape, 4))
-        layer[free.T] = colour
+        layer[free.T] = color
         limits = self.axes.axis()
         self.axes.imshow(
             layer,
@@ -228,7 +228,7 @@ class _Painter:
         # ``imshow`` changes the limits of the axes. This call restores them.
         self.axes.axis(limits)
         square: dict[str, Any] = {"edgecolor": "none", "marker": "s", "s": 60}
-        self.axes.scatter([], [], facecolor=colour, label=thing.label, **square)
+        self.axes.scatter([], [], facecolor=color, label=thing.label, **square)
         if len(echoed):
             dots: dict[str, Any] = {"color": shape.echoes, "ms": 2.5, "zorder": 1.8}
             self.axes.plot(*echoed.T, ".", label=shape.echoes_label, **dots)
@@ -240,7 +240,7 @@ class _Painter:
                 *shape.size[:2],
                 gid="room",
                 fill=False,
-                edgecolor=thing.colour,
+                edgecolor=thing.color,
                 linewidth=4.0,
                 label=thing.label,
                 zorder=1.2,
@@ -249,12 +249,12 @@ class _Painter:
 
     def box(self, thing: Thing, shape: Box) -> None:
         """Draws an obstacle at rest as a filled box, and a moving one as outlines."""
-        label, colour = self.once(thing.label), thing.colour
+        label, color = self.once(thing.label), thing.color
         size = shape.length, shape.width
         gid = f"obstacle {thing.name}"
         if not thing.moves:
             body = [*thing.pose(0), *size]
-            self.body(body, gid=gid, color=colour, label=label, zorder=3.5)
+            self.body(body, gid=gid, color=color, label=label, zorder=3.5)
             return
         for time in self.apart(thing, picture_times(self.result), 0.5 * APART_M):
             body = [*thing.pose(tick_at(self.result, time)), *size]
@@ -262,18 +262,18 @@ class _Painter:
                 body,
                 gid=f"{gid} at {time:g}",
                 fill=False,
-                edgecolor=colour,
+                edgecolor=color,
                 linewidth=1.1,
                 label=label if time == 0.0 else None,
                 zorder=3.5,
             )
-            self.time(body, time, colour)
+            self.time(body, time, color)
         if self.ends_only:
-            self.body([*thing.pose(len(thing.times) - 1), *size], color=colour)
+            self.body([*thing.pose(len(thing.times) - 1), *size], color=color)
 
     def plume(self, thing: Thing, shape: Plume) -> None:
         """Draws the odor source, and its plume at the end of the run."""
-        axes, colour = self.axes, thing.colour
+        axes, color = self.axes, thing.color
         history = plume_history(shape.scenario, self.result.simulated_s)
         x = np.linspace(*axes.get_xlim(), 121)
         y = np.linspace(*axes.get_ylim(), 81)
@@ -282,11 +282,11 @@ class _Painter:
             levels = [0.1, 0.3, 1.0, 3.0, 1e9]
             tints = ["#F3E6EF", "#E7CCDF", "#D9AECB", "#C98BB5"]
             axes.contourf(x, y, dense, levels=levels, colors=tints, zorder=0.5)
-            edge: dict[str, Any] = {"colors": colour, "linewidths": 0.5, "zorder": 0.6}
+            edge: dict[str, Any] = {"colors": color, "linewidths": 0.5, "zorder": 0.6}
             axes.contour(x, y, dense, levels=levels[:1], **edge)
             label = "odor at the end (0.1, 0.3, 1, 3 times C1)"
             axes.scatter([], [], marker="s", s=40, color="#D9AECB", label=label)
-        style: dict[str, Any] = {"color": colour, "ms": 12, "ls": "none"}
+        style: dict[str, Any] = {"color": color, "ms": 12, "ls": "none"}
         axes.plot(*thing.poses[0, :2], "*", label=thing.label, **style)
 
     def trail(self, thing: Thing, shape: Trail) -> None:
@@ -294,7 +294,7 @@ class _Painter:
         self.axes.plot(
             *thing.poses[:, :2].T,
             shape.line,
-            color=thing.colour,
+            color=thing.color,
             linewidth=width,
             label=thing.label,
             zorder=zorder,
@@ -302,11 +302,11 @@ class _Painter:
 
     def source(self, thing: Thing, shape: SourceBody) -> None:
         """Draws a source at both ends of its path, and dots with the times between."""
-        colour = thing.colour
+        color = thing.color
         if not shape.is_body:
             style: dict[str, Any] = {"ls": "none", "ms": 6, "zorder": 4}
             place, label = thing.poses[-1, :2], thing.label
-            self.axes.plot(*place, "D", color=colour, label=label, **style)
+            self.axes.plot(*place, "D", color=color, label=label, **style)
             return
         size = shape.length, shape.width
         ends = (0, len(thing.poses) - 1) if thing.moves else (0,)
@@ -315,49 +315,49 @@ class _Painter:
             self.body(
                 [*thing.poses[index], *size],
                 gid="source",
-                facecolor=(*to_rgb(colour), 0.6 if index else 0.25),
-                edgecolor=colour,
+                facecolor=(*to_rgb(color), 0.6 if index else 0.25),
+                edgecolor=color,
                 label=self.once(f"{thing.label.removeprefix('the ')}, {which}"),
                 zorder=2.5,
             )
         times = self.times_of(next(iter(self.scene.bodies.values())))
         for time in self.apart(thing, times[-1:] if self.ends_only else times, APART_M):
             pose = thing.pose(tick_at(self.result, time))
-            self.axes.plot(*pose[:2], "o", color=colour, markersize=4, zorder=4)
+            self.axes.plot(*pose[:2], "o", color=color, markersize=4, zorder=4)
             if thing.moves:
-                self.time([*pose, *size], time, colour)
+                self.time([*pose, *size], time, color)
 
     def estimates(self, thing: Thing, shape: Estimate) -> None:
         """Draws a cross for each new estimate. Early estimates are faint."""
-        fresh, colour = shape.fresh, thing.colour
+        fresh, color = shape.fresh, thing.color
         if fresh is None or not fresh.any():
             return
         part = thing.times[fresh] / max(self.result.simulated_s, 1e-9)
-        least = faintest(colour)
-        colours = [(*to_rgb(colour), least + (1.0 - least) * p) for p in part]
+        least = faintest(color)
+        colors = [(*to_rgb(color), least + (1.0 - least) * p) for p in part]
         cross: dict[str, Any] = {"marker": "x", "s": 16}
         x, y = thing.poses[fresh, :2].T
-        self.axes.scatter(x, y, c=colours, linewidths=0.9, zorder=6, **cross)
+        self.axes.scatter(x, y, c=colors, linewidths=0.9, zorder=6, **cross)
         # Without this empty plot, the sample in the legend would be as faint as the
         # first estimate.
-        self.axes.scatter([], [], color=colour, label=thing.label, **cross)
+        self.axes.scatter([], [], color=color, label=thing.label, **cross)
 
     def goal(self, thing: Thing, _: Goal) -> None:
         style: dict[str, Any] = {"ms": 11, "ls": "none", "zorder": 5}
         place, label = thing.poses[0, :2], thing.label
-        self.axes.plot(*place, "*", color=thing.colour, label=label, **style)
+        self.axes.plot(*place, "*", color=thing.color, label=label, **style)
 
     def robot(self, thing: Thing, shape: RobotBody) -> None:
         """Draws the outline of a robot and its microphones at several times."""
-        own, colour = shape.parameters, thing.colour
+        own, color = shape.parameters, thing.color
         for time in self.times_of(thing):
             pose = thing.pose(tick_at(self.result, time))
             rectangle = [*pose, own.length_m, own.width_m]
             self.body(
                 rectangle,
                 gid=f"robot at {time:g}",
-                facecolor=(*to_rgb(colour), 0.10),
-                edgecolor=colour,
+                facecolor=(*to_rgb(color), 0.10),
+                edgecolor=color,
                 linewidth=1.0,
                 label=self.once(thing.label),
                 zorder=3,
@@ -365,8 +365,8 @@ class _Painter:
             if shape.hears:
                 bar: dict[str, Any] = {"ms": 3.2, "lw": 2.0, "zorder": 5}
                 microphones = microphones_W(pose, own).T
-                self.axes.plot(*microphones, "-o", color=colour, **bar)
-            self.time(rectangle, time, colour)
+                self.axes.plot(*microphones, "-o", color=color, **bar)
+            self.time(rectangle, time, color)
 
     def hit(self, thing: Thing, shape: Touched) -> None:
         """Draws the touched body where it was at the time of the collision."""
@@ -376,7 +376,7 @@ class _Painter:
         self.body(
             [*thing.pose(tick), shape.length, shape.width],
             gid="hit",
-            facecolor=thing.colour,
+            facecolor=thing.color,
             edgecolor="white",
             linewidth=0.8,
             label=thing.label,
@@ -390,7 +390,7 @@ class _Painter:
             *thing.poses[0, :2],
             "*",
             markerfacecolor="none",
-            markeredgecolor=thing.colour,
+            markeredgecolor=thing.color,
             markeredgewidth=0.9 if small else 1.4,
             markersize=9.0 if small else 19.0,
             label=thing.label,

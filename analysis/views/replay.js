@@ -238,7 +238,7 @@
           d: `M${x(from)} ${TOP + inner}H${x(to)}v-3H${x(from)}z` }));
       for (const series of chart.series) {
         const dots = series.style === "dots";
-        curves.append(make("path", { d: curve(series, x, y), stroke: series.colour,
+        curves.append(make("path", { d: curve(series, x, y), stroke: series.color,
           "stroke-width": dots ? 3.5 : 1.6, "stroke-linecap": dots ? "round" : "butt",
           "stroke-dasharray": series.style === "dashes" ? "5 3" : "none" }));
       }
@@ -246,7 +246,7 @@
       this.svg.replaceChildren(axes, curves, this.line);
       this.readings.replaceChildren(...chart.series.filter((s) => s.label).map((s) => {
         const swatch = make("span", { class: "swatch" });
-        swatch.append(make("i", { style: `background:${s.colour}` }));
+        swatch.append(make("i", { style: `background:${s.color}` }));
         const value = make("span");
         const item = make("span", {}, swatch, `${s.label} `, value);
         item.update = () => { value.textContent = reading(s, chart.ticks); };
@@ -279,7 +279,7 @@
     viewer.animator.play();
     viewer.animator.pause();
     ready = true;
-    // Meshcat's mapping greys the white floor, from which colours then stand out less.
+    // Meshcat's mapping grays the white floor, from which colors then stand out less.
     viewer.renderer.toneMapping = THREE.NoToneMapping;
     // Meshcat's 75 degrees bend what is near the edge.
     viewer.camera.fov = 45;

@@ -23,7 +23,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from analysis.runs.known_space import known_space
 from analysis.views.curves import page_charts
 from analysis.views.floor_layers import clipped, floor_layers
@@ -212,12 +212,12 @@ class _Recorder:
         self,
         path: str,
         shape: Any,
-        colour: str,
+        color: str,
         place: RigidTransform | None = None,
         alpha: float = 1.0,
     ) -> None:
         """Adds an object at a pose in the frame of its parent in the scene tree."""
-        rgba = Rgba(*to_rgb(colour), alpha)
+        rgba = Rgba(*to_rgb(color), alpha)
         if isinstance(shape, Mesh):
             vertices: Any = np.asfortranarray(shape.vertices)
             faces: Any = np.asfortranarray(shape.faces)
@@ -287,7 +287,7 @@ class _Recorder:
         return self.frames, RecordedPath(thing.times, smooth).poses(self.frames)
 
     def _add(self, thing: Thing) -> None:
-        path, colour = thing.path, thing.colour
+        path, color = thing.path, thing.color
         match thing.shape:
             case RobotBody() as shape:
                 self._robot(thing, shape)
@@ -297,7 +297,7 @@ class _Recorder:
                 # The touched body covers the body itself.
                 more = 0.01 if isinstance(size, Touched) else 0.0
                 box, middle = Block(*(each + more for each in size)), 0.5 * size.height
-                self.put(f"{path}/box", box, colour, _placed(0.0, 0.0, middle))
+                self.put(f"{path}/box", box, color, _placed(0.0, 0.0, middle))
             case Walls() as shape:
                 self._walls(thing, shape)
             case Cone() as shape:
@@ -312,10 +312,10 @@ class _Recorder:
                 self._plume(thing, shape)
             case Bar():
                 bar = Block(0.03, 0.03, 1.0)
-                self.put(f"{path}/bar", bar, colour, _placed(0.0, 0.0, 0.5))
+                self.put(f"{path}/bar", bar, color, _placed(0.0, 0.0, 0.5))
             case shape if type(shape) in _SINGLE:
                 single = _SINGLE[type(shape)](shape)
-                self.put(path, single, colour, alpha=thing.alpha)
+                self.put(path, single, color, alpha=thing.alpha)
 
     def _robot(self, thing: Thing, shape: RobotBody) -> None:
         """Adds a robot at the origin of its body frame B."""
@@ -323,7 +323,7 @@ class _Recorder:
         width = _BODY_WIDTH_FRACTION * own.width_m
         body = Block(own.length_m, width, ROBOT_HEIGHT_M - 0.04)
         middle = 0.5 * ROBOT_HEIGHT_M + 0.02
-        self.put(f"{path}/body", body, thing.colour, _placed(0.0, 0.0, middle))
+        self.put(f"{path}/body", body, thing.color, _placed(0.0, 0.0, middle))
         radius = own.wheel_radius_m
         tyre = Cylinder(radius, _WHEEL_WIDTH_M)
         spoke = Block(1.7 * radius, 0.25 * radius, _WHEEL_WIDTH_M + 0.004)
@@ -362,7 +362,7 @@ class _Recorder:
         if shape.is_body:
             body = Block(shape.length, shape.width, BODY_HEIGHT_M)
         middle = _placed(0.0, 0.0, 0.5 * BODY_HEIGHT_M)
-        self.put(f"{thing.path}/body", body, thing.colour, middle)
+        self.put(f"{thing.path}/body", body, thing.color, middle)
         self._loudspeaker(thing.path, BODY_HEIGHT_M)
 
     def _walls(self, thing: Thing, shape: Walls) -> None:
@@ -378,7 +378,7 @@ class _Recorder:
             )
         ):
             wall, place = Block(size_x, size_y, height), _placed(at_x, at_y, 0.125)
-            self.put(f"{thing.path}/wall_{number}", wall, thing.colour, place)
+            self.put(f"{thing.path}/wall_{number}", wall, thing.color, place)
 
     def _cone(self, thing: Thing, shape: Cone) -> None:
         """Adds two cones of different colors, of which one is visible at a time."""
@@ -394,7 +394,7 @@ class _Recorder:
             ("empty", 0.18, ~shape.echo),
         ):
             path = f"{thing.path}/{name}"
-            self.put(path, cone, COLOURS[name], alpha=alpha)
+            self.put(path, cone, COLORS[name], alpha=alpha)
             self.switch(path, thing.times, seen)
 
     def _rings(self, thing: Thing, shape: Rings) -> None:
@@ -403,7 +403,7 @@ class _Recorder:
         times = np.arange(0.0, self.result.simulated_s, RING_S / 2.0)
         for number, radius in enumerate(RINGS_M):
             path = f"{thing.path}/{number + 1}"
-            self.put(path, circle(radius, height, 0.03), thing.colour)
+            self.put(path, circle(radius, height, 0.03), thing.color)
             seen = [ring_at(time, shape.bursts) == number for time in times]
             self.switch(path, times, seen)
 
@@ -417,7 +417,7 @@ class _Recorder:
             if not np.ptp(piece, axis=0).any():
                 continue
             path = f"{thing.path}/{number}"
-            self.put(path, ribbon(piece, z, width), thing.colour)
+            self.put(path, ribbon(piece, z, width), thing.color)
             drawn = thing.times[min(start + step, len(points) - 1)]
             self.switch(path, (0.0, drawn), (False, True))
 
@@ -431,8 +431,8 @@ class _Recorder:
         # would flicker.
         above = 0.0005 * [*self.result.robots].index(shape.own.name)
         dots = 0.25 * known.cell_m * np.array([1.0, -1.0, 1.0, -1.0])
-        for name, cells, colour, height, inset in (
-            ("free", known.free, lightened(thing.colour, 0.2), 0.001, 0.0 * dots),
+        for name, cells, color, height, inset in (
+            ("free", known.free, lightened(thing.color, 0.2), 0.001, 0.0 * dots),
             ("echoes", known.hits > 0.0, shape.echoes, 0.006, dots),
         ):
             layers = floor_layers(known, cells, whole=name == "free")
@@ -441,7 +441,7 @@ class _Recorder:
                 if not len(edges):
                     continue
                 path = f"{thing.path}/{name}_{number}"
-                self.put(path, rectangles(edges, height + above), colour)
+                self.put(path, rectangles(edges, height + above), color)
                 states = [layer.begin <= k < layer.end for k in range(len(known.times))]
                 self.switch(path, known.times, states)
 

@@ -9,7 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from analysis.report.render import COLOURS_CSS
+from analysis.report.render import COLORS_CSS
 from analysis.views.framing import run_title, shown_rectangle
 from analysis.views.scene import Layer, Scene
 
@@ -46,7 +46,7 @@ def replay_page(
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<link rel="icon" href="data:,"><title>{title} - replay</title>'
     )
-    style = f"{COLOURS_CSS}\n{(_HERE / 'replay.css').read_text('utf-8')}"
+    style = f"{COLORS_CSS}\n{(_HERE / 'replay.css').read_text('utf-8')}"
     script = (_HERE / "replay.js").read_text("utf-8")
     # The messages to the scene arrive one by one. The page waits for the last message.
     messages = meshcat_page.count(_HANDLE)
@@ -125,7 +125,7 @@ def _panels(
 
 
 def _entry(layer: Layer) -> str:
-    parts = "".join(f'<i style="background:{colour}"></i>' for colour in layer.colours)
+    parts = "".join(f'<i style="background:{color}"></i>' for color in layer.colors)
     swatch = f'<span class="swatch">{parts}</span>'
     label = html.escape(layer.label)
     small = f"<small>{html.escape(layer.meaning)}</small>"

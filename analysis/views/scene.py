@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.colors import to_hex, to_rgb
 from numpy.typing import NDArray
 
-from analysis.report.palette import COLOURS, ROBOT_COLOURS
+from analysis.report.palette import COLORS, ROBOT_COLORS
 from analysis.runs.contact import contact_point
 from analysis.runs.known_space import has_known_space
 from analysis.views.bursts import call_time, sound_bursts
@@ -135,7 +135,7 @@ class Thing:
     """Unique name, as a path in the scene tree of the 3D viewer."""
     shape: Any
     """A shape of this module or of ``overlays``."""
-    colour: str
+    color: str
     """Color in any form of matplotlib."""
     times: NDArray[np.float64]
     """(n,) ascending times, s."""
@@ -180,7 +180,7 @@ class Layer(NamedTuple):
     label: str
     meaning: str
     """Short explanation; may be empty."""
-    colours: tuple[str, ...]
+    colors: tuple[str, ...]
     """Colors of the sample beside the label."""
     things: list[Thing]
     switched: bool = True
@@ -233,7 +233,7 @@ def scene_bodies(
     and rad.
     """
     found = {}
-    several, tints = len(robots) > 1, _robot_colours(scenario)
+    several, tints = len(robots) > 1, _robot_colors(scenario)
     for name, poses in robots.items():
         robot = scenario.robots[name]
         path = f"robots/{name}" if several else "robot"
@@ -246,17 +246,17 @@ def scene_bodies(
     followed = {scenario.target(name) for name in scenario.robots}
     for name, source in scenario.sources.items():
         path = f"sources/{name}" if len(scenario.sources) > 1 else "source"
-        colour = COLOURS["source" if name in followed else "interferer"]
+        color = COLORS["source" if name in followed else "interferer"]
         body = SourceBody(source.length_m, source.width_m, source.body)
         poses = source.path().poses(times)
         label = _source_label(scenario, name, followed)
-        found[name] = Thing(path, body, colour, times, poses, name, label)
+        found[name] = Thing(path, body, color, times, poses, name, label)
     for each in scenario.obstacles:
         poses = each.path().poses(times if each.path().moves else times[:1])
         label = "moving obstacle" if each.path().moves else "obstacle at rest"
         box, path = Box(*each.size_m, BODY_HEIGHT_M), f"obstacles/{each.name}"
-        colour = COLOURS["obstacle"]
-        found[each.name] = Thing(path, box, colour, times, poses, each.name, label)
+        color = COLORS["obstacle"]
+        found[each.name] = Thing(path, box, color, times, poses, each.name, label)
     return found
 
 
@@ -266,18 +266,18 @@ def _source_label(scenario: Scenario, name: str, followed: set[str]) -> str:
     return name if len(scenario.sources) > 1 else "the source"
 
 
-def _robot_colours(scenario: Scenario) -> dict[str, str]:
+def _robot_colors(scenario: Scenario) -> dict[str, str]:
     """Returns the color of each robot; each of several robots has its own color."""
     if len(scenario.robots) == 1:
-        return dict.fromkeys(scenario.robots, COLOURS["robot"])
-    return dict(zip(scenario.robots, cycle(ROBOT_COLOURS), strict=False))
+        return dict.fromkeys(scenario.robots, COLORS["robot"])
+    return dict(zip(scenario.robots, cycle(ROBOT_COLORS), strict=False))
 
 
-def _estimate_colours(scenario: Scenario) -> dict[str, str]:
+def _estimate_colors(scenario: Scenario) -> dict[str, str]:
     """Returns the color of the position that each robot assumes for its target."""
     if len(scenario.robots) == 1:
-        return dict.fromkeys(scenario.robots, COLOURS["estimate"])
-    return _robot_colours(scenario)
+        return dict.fromkeys(scenario.robots, COLORS["estimate"])
+    return _robot_colors(scenario)
 
 
 def _robots(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
@@ -292,33 +292,33 @@ def _robots(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
                 start = own.simulated_s if call is None else call + sound.start_s
                 sound = sound.model_copy(update={"start_s": start})
             things.append(_rings(body, sound_bursts(sound, result.simulated_s)))
-        yield Layer(name, f"law {law}", (body.colour,), things, switched=False)
+        yield Layer(name, f"law {law}", (body.color,), things, switched=False)
 
 
 def _rings(body: Thing, bursts: list[tuple[float, float]]) -> Thing:
     path, at_rest = f"{body.path}/rings", np.zeros((1, 3))
     rings = Rings(bursts)
-    return Thing(path, rings, body.colour, body.times, at_rest, parent=body)
+    return Thing(path, rings, body.color, body.times, at_rest, parent=body)
 
 
 def _sources(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
     scenario = result.full_scenario
     for name, source in scenario.sources.items():
         body, meaning = bodies[name], "what is followed"
-        if body.colour == COLOURS["interferer"]:
+        if body.color == COLORS["interferer"]:
             meaning = "emits sound, and the robot does not follow it"
         rings = _rings(body, sound_bursts(source.sound, result.simulated_s))
-        yield Layer(name, meaning, (body.colour,), [body, rings], switched=False)
+        yield Layer(name, meaning, (body.color,), [body, rings], switched=False)
 
 
 def _obstacles(scenario: Scenario, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
     things = [bodies[each.name] for each in scenario.obstacles]
     if things:
-        yield Layer("obstacles", "", (COLOURS["obstacle"],), things, switched=False)
+        yield Layer("obstacles", "", (COLORS["obstacle"],), things, switched=False)
 
 
 def _collisions(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
-    things, colour = [], COLOURS["hit"]
+    things, color = [], COLORS["hit"]
     for name, own in result.robots.items():
         if own.collision is None:
             continue
@@ -335,7 +335,7 @@ def _collisions(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Laye
             Thing(
                 f"{carrier.path if carrier else 'collision/' + robot.path}/hit",
                 Touched(length, width, BODY_HEIGHT_M),
-                colour,
+                color,
                 own.time,
                 place,
                 label=f"{hit.object}, which was touched",
@@ -355,7 +355,7 @@ def _collisions(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Laye
             )
         )
     if things:
-        yield Layer("what was hit", "from then on", (colour,), things, switched=False)
+        yield Layer("what was hit", "from then on", (color,), things, switched=False)
 
 
 def _cones(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
@@ -367,7 +367,7 @@ def _cones(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
                 own.columns[f"range_{sensor + 1}"],
                 own.columns[f"echo_{sensor + 1}"] > 0.5,
             ),
-            COLOURS["echo"],
+            COLORS["echo"],
             own.time,
             sensor_pose(own.scenario.only, sensor)[None],
             parent=bodies[name],
@@ -375,9 +375,9 @@ def _cones(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
         for name, own in result.robots.items()
         for sensor in _logged_sensors(own)
     ]
-    colours, meaning = (COLOURS["echo"], COLOURS["empty"]), "with or without an echo"
+    colors, meaning = (COLORS["echo"], COLORS["empty"]), "with or without an echo"
     if things:
-        yield Layer("cones", f"ultrasonic; {meaning}", colours, things)
+        yield Layer("cones", f"ultrasonic; {meaning}", colors, things)
 
 
 def _logged_sensors(result: RunResult) -> range:
@@ -413,7 +413,7 @@ def compose(
 
 def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
     scenario, things = result.full_scenario, []
-    colours = _estimate_colours(scenario)
+    colors = _estimate_colors(scenario)
     routes = any(robot.kind == "router" for robot in scenario.robots.values())
     for name, own in result.robots.items():
         robot, columns = own.scenario.only, own.columns
@@ -431,8 +431,8 @@ def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer
         else:
             continue
         poses = np.column_stack([*places, np.zeros(len(own.time))])
-        colour, jumps = colours[name], seen is not None
-        ball = Thing(path, shape, colour, own.time, poses, "", label, seen)
+        color, jumps = colors[name], seen is not None
+        ball = Thing(path, shape, color, own.time, poses, "", label, seen)
         height = BODY_HEIGHT_M + (0.07 if jumps else -0.05)
         things.append(replace(ball, height=height, jumps=jumps))
         if robot.kind == "router":
@@ -441,13 +441,13 @@ def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer
     if routes:
         label, meaning = "targets", "the target on the route"
     if things:
-        yield Layer(label, meaning, tuple(colours.values()), things)
+        yield Layer(label, meaning, tuple(colors.values()), things)
 
 
 def _goal(own: RunResult, body: Thing, *, several: bool) -> Thing:
     path, label = f"goals/{body.path}", "goals" if several else "goal"
     place = np.array([[*own.scenario.router.route.goal_m, 0.0]])
-    goal = Thing(path, Goal(), body.colour, own.time, place, "", label)
+    goal = Thing(path, Goal(), body.color, own.time, place, "", label)
     return replace(goal, height=0.006, alpha=0.6)
 
 
@@ -456,21 +456,21 @@ def _known_floor(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Lay
     for name, own in result.robots.items():
         if not has_known_space(own):
             continue
-        seen, echoes, colour = "", "", bodies[name].colour
+        seen, echoes, color = "", "", bodies[name].color
         if result.several:
             seen, echoes = f" by {name}", f" to {name}"
         shape = KnownFloor(
             own,
-            colour if result.several else COLOURS["echoes"],
+            color if result.several else COLORS["echoes"],
             f"places that echoes{echoes} came from",
         )
-        colour = colour if result.several else COLOURS["seen"]
+        color = color if result.several else COLORS["seen"]
         label, path = f"seen as free{seen} at the end", f"known/{bodies[name].path}"
         at_rest = np.zeros((1, 3))
-        things.append(Thing(path, shape, colour, own.time, at_rest, label=label))
-    colours = tuple(lightened(thing.colour, 0.35) for thing in things)
+        things.append(Thing(path, shape, color, own.time, at_rest, label=label))
+    colors = tuple(lightened(thing.color, 0.35) for thing in things)
     if things:
-        yield Layer("known floor", "seen as free; dots: echoes", colours, things)
+        yield Layer("known floor", "seen as free; dots: echoes", colors, things)
 
 
 def _trails(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
@@ -485,7 +485,7 @@ def _trails(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
         things.append(_trail(f"trail/{body.path}", places, body, "-", label))
         if own.scenario.only.kind != "router":
             continue
-        tinted = replace(body, colour=_estimate_colours(scenario)[name])
+        tinted = replace(body, color=_estimate_colors(scenario)[name])
         label = "paths of the targets" if several else "path of the target"
         path, places = f"trail/target/{body.path}", own.vector("target")
         things.append(_trail(path, places, tinted, ":", label))
@@ -494,38 +494,38 @@ def _trails(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
         if body.moves:
             path, label = f"trail/{body.path}", f"path of {body.label}"
             things.append(_trail(path, body.poses[:, :2].T, body, "--", label))
-    colours = tuple(_robot_colours(scenario).values())
-    yield Layer("trails", "past positions", colours, things)
+    colors = tuple(_robot_colors(scenario).values())
+    yield Layer("trails", "past positions", colors, things)
 
 
 def _trail(
     path: str, places: NDArray[np.float64], body: Thing, line: str, label: str
 ) -> Thing:
     poses = np.column_stack([*places, np.zeros(len(body.times))])
-    return Thing(path, Trail(line), body.colour, body.times, poses, label=label)
+    return Thing(path, Trail(line), body.color, body.times, poses, label=label)
 
 
 def _walls(scenario: Scenario) -> Iterator[Layer]:
-    room, colour = scenario.room, COLOURS["wall"]
+    room, color = scenario.room, COLORS["wall"]
     if room is not None:
         x, y = map(float, room.corner)
         at_rest = np.zeros((1, 3))
         shape = Walls((x, y), room.size_m)
         label, start = "walls of the room", np.zeros(1)
-        wall = Thing("room", shape, colour, start, at_rest, label=label)
-        yield Layer("walls", "of the room", (colour,), [wall])
+        wall = Thing("room", shape, color, start, at_rest, label=label)
+        yield Layer("walls", "of the room", (color,), [wall])
 
 
 def _odor(scenario: Scenario) -> Iterator[Layer]:
-    odor, colour = scenario.odor, COLOURS["odor"]
+    odor, color = scenario.odor, COLORS["odor"]
     if odor is not None:
         place, start = np.array([[*odor.position_m, 0.0]]), np.zeros(1)
         shape, label = Plume(scenario), "source of odour"
-        plume = Thing("odor", shape, colour, start, place, label=label)
-        yield Layer("odour", "the plume", (colour,), [plume])
+        plume = Thing("odor", shape, color, start, place, label=label)
+        yield Layer("odour", "the plume", (color,), [plume])
 
 
-def lightened(colour: str, part: float) -> str:
+def lightened(color: str, part: float) -> str:
     """Mixes a color with white; ``part`` is the share of the color, 0 to 1."""
-    red, green, blue = (1.0 - part * (1.0 - level) for level in to_rgb(colour))
+    red, green, blue = (1.0 - part * (1.0 - level) for level in to_rgb(color))
     return to_hex((red, green, blue))

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from analysis.report.notebook_figure import NotebookFigure
-from analysis.report.palette import COLOURS, draw_grid
+from analysis.report.palette import COLORS, draw_grid
 from analysis.views.bursts import heard_bursts
 from analysis.views.curves import Curve, Panel, panels
 from analysis.views.framing import picture_title
@@ -36,9 +36,9 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     all_axes = np.atleast_1d(figure.subplots(len(shown), sharex=True))
     for axes, panel in zip(all_axes, shown, strict=True):
         for start, end in bursts:
-            axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
+            axes.axvspan(start, end, color=COLORS["sound"], alpha=0.25, linewidth=0)
             # Yellow is hard to see on white. The line at the bottom is easy to see.
-            axes.axvspan(start, end, ymax=0.025, color=COLOURS["sounding"], linewidth=0)
+            axes.axvspan(start, end, ymax=0.025, color=COLORS["sounding"], linewidth=0)
         _draw(axes, panel)
     hears = not result.scenario.only.has_goal
     all_axes[-1].set(
@@ -56,7 +56,7 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.broken_barh(
             [(start, end - start) for start, end in spans],
             (low, high - low),
-            facecolor=shade.colour,
+            facecolor=shade.color,
             alpha=shade.alpha,
             linewidth=0.0,
             label=shade.label,
@@ -83,7 +83,7 @@ def _draw(axes: Axes, panel: Panel) -> None:
 
 
 def _style(curve: Curve) -> dict[str, Any]:
-    style: dict[str, Any] = {"color": curve.colour, "label": curve.label}
+    style: dict[str, Any] = {"color": curve.color, "label": curve.label}
     if curve.style == "dots":
         return {
             **style,

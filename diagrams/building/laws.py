@@ -22,7 +22,7 @@ from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import COMMANDS
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
-from systems.laws.catalogue import LAWS, ROUTE_LAWS
+from systems.laws.catalog import LAWS, ROUTE_LAWS
 from systems.ranging.collision_vector import SLOTS
 
 #: Optional output ports of a law for the log, with sizes.

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from diagrams.scenario.participants import KINDS, kind_of
 from diagrams.scenario.shorthand import ROBOT_FIELDS
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 _LOGGER = logging.getLogger("phonotaxis")
 _TABLE = Path(__file__).with_suffix(".tsv")

@@ -35,7 +35,7 @@ from systems.hearing.parameters import (
     TDOAParameters,
     TrackerParameters,
 )
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 from systems.laws.parameters import AttractionParameters, ImpedanceParameters
 from systems.laws.trajectory.trajectory_conventional import (
     TrajectoryImpedanceParameters,

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from diagrams.scenario.participants import DEFAULT_LAW, KINDS, Robot, kind_of
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 #: Names of the only robot and of the only source.
 ROBOT, SOURCE = "robot", "source"

@@ -86,7 +86,7 @@ def _drivers(names: str | None) -> Sequence[str]:
     from analysis.safety.driver_trials import DRIVERS, USUAL
     from diagrams.scenario.suggestions import did_you_mean
     from systems.framework.input_error import InputError
-    from systems.laws.catalogue import LAWS
+    from systems.laws.catalog import LAWS
 
     if names is None:
         return USUAL

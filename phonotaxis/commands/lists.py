@@ -82,7 +82,7 @@ def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
     found = find_fields(schema, options.pattern)
     if options.law is not None:
         from diagrams.scenario.suggestions import unknown_law
-        from systems.laws.catalogue import LAWS
+        from systems.laws.catalog import LAWS
 
         if options.law not in LAWS:
             raise unknown_law(options.law, LAWS)

@@ -11,7 +11,7 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
 from analysis.loops.linear_plots import panels
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from studies.linear.burst_gaps import GapChart
 from studies.linear.root_locus import RootLocus
 from studies.linear.sampled_stability import PolesAgainstPeriod, StabilityChart
@@ -63,12 +63,10 @@ def plot_poles_against_period(found: PolesAgainstPeriod) -> Figure:
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     angle = np.linspace(0.0, 2.0 * np.pi, 300)
-    left.plot(np.cos(angle), np.sin(angle), color=COLOURS["empty"], linewidth=0.8)
-    colours = np.repeat(
-        np.log10(found.periods_s)[:, None], found.poles.shape[1], axis=1
-    )
+    left.plot(np.cos(angle), np.sin(angle), color=COLORS["empty"], linewidth=0.8)
+    colors = np.repeat(np.log10(found.periods_s)[:, None], found.poles.shape[1], axis=1)
     dots = left.scatter(
-        found.poles.real, found.poles.imag, c=10.0**colours, s=6, norm="log"
+        found.poles.real, found.poles.imag, c=10.0**colors, s=6, norm="log"
     )
     left.set_aspect("equal")
     left.set_xlim(-1.6, 1.3)
@@ -79,7 +77,7 @@ def plot_poles_against_period(found: PolesAgainstPeriod) -> Figure:
     right.semilogx(found.periods_s, found.growth_per_s, color=_LINES[0])
     right.axhline(0.0, color="black", linewidth=0.8)
     right.axvline(
-        found.today_s, color=COLOURS["source"], linestyle="--", label="current"
+        found.today_s, color=COLORS["source"], linestyle="--", label="current"
     )
     right.set_ylim(-0.35, 0.5)
     right.set_xlabel("sample period (s)")
@@ -93,12 +91,12 @@ def plot_gap_chart(chart: GapChart) -> Figure:
     figure = Figure(figsize=(6.8, 4.2), layout="constrained")
     axes = figure.subplots()
     styles = {"world": "-", "robot": "-", "motion": "--"}
-    for hold, row, colour in zip(chart.holds, chart.multiplier, _LINES, strict=False):
+    for hold, row, color in zip(chart.holds, chart.multiplier, _LINES, strict=False):
         axes.semilogy(
-            chart.gaps_s, row, styles[hold], color=colour, label=f"hold: {hold}"
+            chart.gaps_s, row, styles[hold], color=color, label=f"hold: {hold}"
         )
     axes.axhline(1.0, color="black", linewidth=0.8)
-    axes.axvline(chart.today[0], color=COLOURS["empty"], linestyle=":")
+    axes.axvline(chart.today[0], color=COLORS["empty"], linestyle=":")
     if chart.today[1] in chart.holds:
         row = chart.multiplier[chart.holds.index(chart.today[1])]
         at = float(np.interp(chart.today[0], chart.gaps_s, row))

@@ -12,7 +12,7 @@ from analysis.loops.contact_mode import contact_model
 from analysis.loops.linear_models import LinearModel
 from analysis.loops.radial_law import radial_law
 from diagrams.scenario.scenario import Scenario
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 #: Factors on the scenario's gain.
 _FACTORS = np.geomspace(0.05, 20.0, 121)

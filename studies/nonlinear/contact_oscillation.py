@@ -41,7 +41,7 @@ class OscillationRun:
     """Why the run ended."""
     amplitudes_m: NDArray[np.float64]
     """(cycles,) amplitudes: half of the difference between maximum and minimum, m."""
-    centres_m: NDArray[np.float64]
+    centers_m: NDArray[np.float64]
     """(cycles,) mean clearances over each cycle, m."""
     growth_per_s: NDArray[np.float64]
     """(cycles,) growth rates of the amplitude, 1/s."""
@@ -194,8 +194,8 @@ def _cycles(
             ]
         )
     table = np.array(rows).reshape(-1, 3)
-    amplitudes, centres, spans = table.T
+    amplitudes, centers, spans = table.T
     if len(table) < 2:
-        return amplitudes, centres, np.zeros(len(table)), 2.0 * np.pi / spans
+        return amplitudes, centers, np.zeros(len(table)), 2.0 * np.pi / spans
     growth = np.gradient(np.log(amplitudes), np.cumsum(spans))
-    return amplitudes, centres, growth, 2.0 * np.pi / spans
+    return amplitudes, centers, growth, 2.0 * np.pi / spans

@@ -32,7 +32,7 @@ class OscillationPrediction:
 
     amplitudes_m: NDArray[np.float64]
     """(n,) amplitudes A up to the largest for which a balance was found, m."""
-    centres_m: NDArray[np.float64]
+    centers_m: NDArray[np.float64]
     """(n,) centers c_0 of the oscillation, m."""
     growth_per_s: NDArray[np.float64]
     """(n,) growth rates g of the amplitude, 1/s; negative if the oscillation decays."""
@@ -52,21 +52,21 @@ class OscillationPrediction:
         part = g[k] / (g[k] - g[k + 1])
         a, c, w = (
             float(v[k] + part * (v[k + 1] - v[k]))
-            for v in (self.amplitudes_m, self.centres_m, self.frequencies_rad_s)
+            for v in (self.amplitudes_m, self.centers_m, self.frequencies_rad_s)
         )
         return a, c, w
 
     def at(self, amplitude: float) -> tuple[float, float, float]:
         """(c_0, g, w) at an amplitude, m, by interpolation: m, 1/s and rad/s."""
-        centre, growth, frequency = (
+        center, growth, frequency = (
             float(np.interp(amplitude, self.amplitudes_m, v))
-            for v in (self.centres_m, self.growth_per_s, self.frequencies_rad_s)
+            for v in (self.centers_m, self.growth_per_s, self.frequencies_rad_s)
         )
-        return centre, growth, frequency
+        return center, growth, frequency
 
     def to_dict(self) -> dict[str, Any]:
         """Values for the JSON document."""
-        names = ("amplitude_m", "centre_m", "frequency_rad_s")
+        names = ("amplitude_m", "center_m", "frequency_rad_s")
         cycle = self.limit_cycle and dict(zip(names, self.limit_cycle, strict=True))
         return vars(self) | {"limit_cycle": cycle}
 
@@ -106,7 +106,7 @@ def predict_oscillation(
     below = table[table[:, 0] * table[:, 3] <= top, 0]
     return OscillationPrediction(
         amplitudes_m=table[:, 0],
-        centres_m=table[:, 1],
+        centers_m=table[:, 1],
         growth_per_s=table[:, 2],
         frequencies_rad_s=table[:, 3],
         clamp_amplitude_m=float(below.max(initial=0.0)),
@@ -121,12 +121,12 @@ def _imbalance(
     x: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Residual of the balance: mean force, then real and imaginary first harmonic."""
-    centre, growth, frequency = x
+    center, growth, frequency = x
     tick_s = contact.scenario.tick_s
     turn = frequency * tick_s
     phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
-    c = centre + amplitude * np.sin(phase)
-    before = centre + amplitude * np.sin(phase - turn)
+    c = center + amplitude * np.sin(phase)
+    before = center + amplitude * np.sin(phase - turn)
     speeds = sensed_speeds(c, before, term, tick_s)
     places = zip(c.tolist(), speeds.tolist(), strict=True)
     force = np.array([contact.force(*place) for place in places])

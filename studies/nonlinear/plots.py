@@ -9,14 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from studies.nonlinear.contact_oscillation import ContactOscillation
 from studies.nonlinear.equilibrium_maps import BOX_X_M, EquilibriumMap
 from studies.nonlinear.phase_portrait import PhasePortrait
 from studies.nonlinear.stiffness_ratio import RatioMap
 from studies.nonlinear.velocity_terms import VelocityTermAnalysis
 
-_STYLES = {"printed": (COLOURS["robot"], "-"), "closing": (COLOURS["source"], "--")}
+_STYLES = {"printed": (COLORS["robot"], "-"), "closing": (COLORS["source"], "--")}
 
 
 def plot_velocity_terms(analysis: VelocityTermAnalysis) -> Figure:
@@ -33,14 +33,14 @@ def plot_velocity_terms(analysis: VelocityTermAnalysis) -> Figure:
     figure = Figure(figsize=(10.0, 3.6), layout="constrained")
     plane, bias, damping = figure.subplots(1, 3)
     for name, variant in analysis.variants.items():
-        colour, line = _STYLES[name]
+        color, line = _STYLES[name]
         for side, marker in ((variant.approaching, "<"), (variant.receding, ">")):
             size = 9 if name == "printed" else 5
             plane.plot(
                 side.poles.real,
                 side.poles.imag,
                 marker,
-                color=colour,
+                color=color,
                 markersize=size,
                 linestyle="none",
                 label=f"{name}, {side.direction}",
@@ -50,11 +50,11 @@ def plot_velocity_terms(analysis: VelocityTermAnalysis) -> Figure:
             (bias, found.bias_n, found.sampled_bias_n),
             (damping, found.damping_n_s_m, found.sampled_damping_n_s_m),
         ):
-            axes.plot(found.amplitudes_m_s, exact, line, color=colour, label=name)
+            axes.plot(found.amplitudes_m_s, exact, line, color=color, label=name)
             axes.plot(
-                found.amplitudes_m_s[::3], sampled[::3], ".", color=colour, markersize=5
+                found.amplitudes_m_s[::3], sampled[::3], ".", color=color, markersize=5
             )
-    plane.axvline(0.0, color=COLOURS["empty"], linewidth=0.8)
+    plane.axvline(0.0, color=COLORS["empty"], linewidth=0.8)
     _label(plane, "real part (1/s)", "imaginary part (rad/s)", "one-sided poles")
     plane.legend(fontsize=8, loc="center left")
     amplitude = "speed amplitude (m/s)"
@@ -68,31 +68,31 @@ def plot_velocity_terms(analysis: VelocityTermAnalysis) -> Figure:
 def plot_contact_oscillation(oscillation: ContactOscillation) -> Figure:
     """Plots the clearance over time, and growth rate and center by amplitude."""
     figure = Figure(figsize=(10.0, 3.6), layout="constrained")
-    motion, growth, centre = figure.subplots(1, 3)
+    motion, growth, center = figure.subplots(1, 3)
     largest = 0.0
     for name, run in oscillation.runs.items():
-        colour, line = _STYLES[name]
+        color, line = _STYLES[name]
         predicted = oscillation.predictions[name]
-        motion.plot(run.times_s, run.clearances_m, color=colour, linewidth=0.9)
+        motion.plot(run.times_s, run.clearances_m, color=color, linewidth=0.9)
         for axes, curve, dots in (
             (growth, predicted.growth_per_s, run.growth_per_s),
-            (centre, predicted.centres_m, run.centres_m),
+            (center, predicted.centers_m, run.centers_m),
         ):
-            axes.plot(predicted.amplitudes_m, curve, line, color=colour, label=name)
-            axes.plot(run.amplitudes_m, dots, ".", color=colour, markersize=6)
+            axes.plot(predicted.amplitudes_m, curve, line, color=color, label=name)
+            axes.plot(run.amplitudes_m, dots, ".", color=color, markersize=6)
         largest = max(largest, float(run.amplitudes_m.max(initial=0.05)))
     motion.axhline(
-        oscillation.contact.equilibrium_m, color=COLOURS["empty"], linewidth=0.8
+        oscillation.contact.equilibrium_m, color=COLORS["empty"], linewidth=0.8
     )
     _label(motion, "time (s)", "clearance (m)", "simulated build, head-on")
-    growth.axhline(0.0, color=COLOURS["empty"], linewidth=0.8)
+    growth.axhline(0.0, color=COLORS["empty"], linewidth=0.8)
     _label(growth, "amplitude (m)", "growth (1/s)", "growth: lines predicted")
-    _label(centre, "amplitude (m)", "centre (m)", "centre: dots simulated")
-    for axes in (growth, centre):
+    _label(center, "amplitude (m)", "center (m)", "center: dots simulated")
+    for axes in (growth, center):
         axes.set_xlim(0.0, 1.2 * largest)
         axes.legend(fontsize=8)
     _fit(growth, oscillation, "growth_per_s", 1.2 * largest)
-    _fit(centre, oscillation, "centres_m", 1.2 * largest)
+    _fit(center, oscillation, "centers_m", 1.2 * largest)
     return figure
 
 
@@ -120,11 +120,11 @@ def plot_phase_portrait(portrait: PhasePortrait) -> Figure:
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     axes = figure.subplots()
     c, rate = portrait.clearances_m, portrait.rates_m_s
-    for mask, colour in (
+    for mask, color in (
         (portrait.certified, "#DCEBF7"),
         (portrait.collides, "#F6D3BF"),
     ):
-        axes.contourf(c, rate, mask.T.astype(float), levels=[0.5, 1.5], colors=[colour])
+        axes.contourf(c, rate, mask.T.astype(float), levels=[0.5, 1.5], colors=[color])
     axes.streamplot(
         c,
         rate,
@@ -136,21 +136,21 @@ def plot_phase_portrait(portrait: PhasePortrait) -> Figure:
         arrowsize=0.7,
     )
     for track in portrait.trajectories:
-        axes.plot(*track.T, color=COLOURS["robot"], linewidth=1.0)
-        axes.plot(*track[0], "o", color=COLOURS["robot"], markersize=3)
+        axes.plot(*track.T, color=COLORS["robot"], linewidth=1.0)
+        axes.plot(*track[0], "o", color=COLORS["robot"], markersize=3)
     for place in portrait.contact.equilibria_m:
         held = portrait.contact.slope(place) < 0.0
         axes.plot(
             place,
             0.0,
             "o",
-            color=COLOURS["obstacle"],
-            markerfacecolor=COLOURS["obstacle"] if held else "white",
+            color=COLORS["obstacle"],
+            markerfacecolor=COLORS["obstacle"] if held else "white",
             zorder=5,
         )
     axes.set_xlim(0.0, c[-1])
     axes.set_ylim(rate[0], rate[-1])
-    axes.axvline(portrait.contact_m, color=COLOURS["source"], linewidth=1.0)
+    axes.axvline(portrait.contact_m, color=COLORS["source"], linewidth=1.0)
     axes.set_xlabel("clearance c (m)")
     axes.set_ylabel("dc/dt (m/s)")
     axes.set_title(
@@ -171,9 +171,9 @@ def plot_phase_portrait(portrait: PhasePortrait) -> Figure:
 
 
 _MARKERS = {
-    "goal": (".", COLOURS["empty"], "beyond the boxes"),
-    "jam": ("o", COLOURS["source"], "held before them"),
-    "collision": ("x", COLOURS["obstacle"], "hits a box"),
+    "goal": (".", COLORS["empty"], "beyond the boxes"),
+    "jam": ("o", COLORS["source"], "held before them"),
+    "collision": ("x", COLORS["obstacle"], "hits a box"),
 }
 _NAMES = {
     "gap_m": "gap between two boxes (m)",
@@ -195,17 +195,17 @@ def plot_equilibrium_maps(maps: Sequence[EquilibriumMap]) -> Figure:
     figure = Figure(figsize=(3.4 * len(maps), 3.6), layout="constrained")
     panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
     for axes, found in zip(panels, maps, strict=True):
-        for outcome, (marker, colour, label) in _MARKERS.items():
+        for outcome, (marker, color, label) in _MARKERS.items():
             points = [p for p in found.points if p.outcome == outcome]
             if points:
                 axes.plot(
                     [p.value for p in points],
                     [p.x_m for p in points],
                     marker,
-                    color=colour,
+                    color=color,
                     label=label,
                 )
-        axes.axhline(BOX_X_M, color=COLOURS["obstacle"], linewidth=0.8)
+        axes.axhline(BOX_X_M, color=COLORS["obstacle"], linewidth=0.8)
         _label(axes, _NAMES[found.parameter], "", f"{found.law}, {found.sensing}")
         axes.legend(fontsize=8)
     panels[0].set_ylabel("x of P at rest (m)")
@@ -218,10 +218,10 @@ def plot_ratio_map(found: RatioMap) -> Figure:
     axes = figure.subplots()
     outer = "held along the line, not to the side: saddle"
     inner = "the push vanishes, P moves on: source"
-    ratios, colours = found.ratios, COLOURS
-    axes.semilogx(ratios, found.outer_m, "-", color=colours["robot"], label=outer)
-    axes.semilogx(ratios, found.inner_m, "--", color=colours["source"], label=inner)
-    axes.axvline(found.today, color=COLOURS["empty"], linewidth=0.8)
+    ratios, colors = found.ratios, COLORS
+    axes.semilogx(ratios, found.outer_m, "-", color=colors["robot"], label=outer)
+    axes.semilogx(ratios, found.inner_m, "--", color=colors["source"], label=inner)
+    axes.axvline(found.today, color=COLORS["empty"], linewidth=0.8)
     axes.set_xticks(
         [1.5, 2, 4, 8, 16, 32, 64], ["1.5", "2", "4", "8", "16", "32", "64"]
     )

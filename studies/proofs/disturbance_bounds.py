@@ -197,11 +197,11 @@ def _ultimate_bound(model: PointMass, speed: float, d: float, e: float) -> float
     Q = np.array([[e * K, -0.5 * e * D], [-0.5 * e * D, D - e * M]])
     b = d * np.array([e, 1.0])
     # z' Q z = b' z is an ellipse through 0 with center Q^-1 b / 2. W is largest on it.
-    centre = 0.5 * np.linalg.solve(Q, b)
-    radius = math.sqrt(max(float(centre @ Q @ centre), 0.0))
+    center = 0.5 * np.linalg.solve(Q, b)
+    radius = math.sqrt(max(float(center @ Q @ center), 0.0))
     root = np.linalg.cholesky(np.linalg.inv(Q))
     angle = np.linspace(0.0, 2.0 * np.pi, 721)
-    ring = centre[:, None] + radius * root @ np.array([np.cos(angle), np.sin(angle)])
+    ring = center[:, None] + radius * root @ np.array([np.cos(angle), np.sin(angle)])
     # Chords between neighboring points shorten the ellipse by at most this factor.
     x, w = np.maximum(ring, 0.0) / math.cos(math.pi / 720.0)
     level = float(np.max(0.5 * K * x**2 + 0.5 * M * w**2 + e * M * x * w))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from studies.nonlinear.phase_portrait import certified_speeds, head_on_model
 from studies.proofs.disturbance_bounds import (
     DisturbanceBounds,
@@ -36,10 +36,10 @@ def plot_sos_region(region: SosRegion) -> Figure:
     grid_x, grid_v = np.meshgrid(x, v, indexing="ij")
     y = np.stack([grid_x, grid_v, grid_v], axis=-1) / scales
     V = np.einsum("...i,ij,...j->...", y, region.P, y)
-    axes.contour(rest + x, v, V.T, levels=[1.0], colors=[COLOURS["robot"]])
-    axes.plot([], [], color=COLOURS["robot"], label="sum of squares, with motor lag")
-    axes.plot(rest, 0.0, "o", color=COLOURS["obstacle"], markersize=4)
-    axes.axvline(region.contact_m, color=COLOURS["source"], linewidth=1.0)
+    axes.contour(rest + x, v, V.T, levels=[1.0], colors=[COLORS["robot"]])
+    axes.plot([], [], color=COLORS["robot"], label="sum of squares, with motor lag")
+    axes.plot(rest, 0.0, "o", color=COLORS["obstacle"], markersize=4)
+    axes.axvline(region.contact_m, color=COLORS["source"], linewidth=1.0)
     axes.set_xlabel("clearance c (m)")
     axes.set_ylabel("v = w (m/s)")
     axes.set_title(
@@ -65,17 +65,17 @@ def plot_disturbance_bounds(bounds: DisturbanceBounds) -> Figure:
         ("steady_m", "steady", ":"),
     ):
         speeds, stretches = _points(straight, name)
-        source.plot(speeds, stretches, style, color=COLOURS["robot"], label=label)
+        source.plot(speeds, stretches, style, color=COLORS["robot"], label=label)
     source.set_xlabel("speed of the source (m/s)")
     source.set_ylabel("largest |stretch| (m)")
     source.set_title("following a source that moves off", fontsize=11)
-    for name, label, style, colour in (
+    for name, label, style, color in (
         ("certified_s", "certified", "-", "robot"),
         ("encounter_s", "passing through the reach", "--", "obstacle"),
         ("simulated_contact_s", "earliest simulated contact", "x", "source"),
     ):
         speeds, times = _points(bounds.obstacle, name)
-        obstacle.semilogy(speeds, times, style, color=COLOURS[colour], label=label)
+        obstacle.semilogy(speeds, times, style, color=COLORS[color], label=label)
     obstacle.set_xlabel("speed of the obstacle (m/s)")
     obstacle.set_ylabel("time (s)")
     obstacle.set_title("an obstacle that comes at a waiting robot", fontsize=11)

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from analysis.report.intervals import estimate_rate
-from analysis.report.palette import COLOURS, draw_grid
+from analysis.report.palette import COLORS, draw_grid
 from studies.support.detection import DetectionPoint, FalseAlarms
 
-#: Colours of the sounds, in turn.
-_COLOURS = (COLOURS["robot"], COLOURS["source"])
+#: Colors of the sounds, in turn.
+_COLORS = (COLORS["robot"], COLORS["source"])
 
 
 def plot_detection(
@@ -39,8 +39,8 @@ def plot_detection(
     """
     figure = Figure(figsize=(11.0, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for colour, (name, points) in zip(_COLOURS, curves.items(), strict=True):
-        _curve(left, name.replace("_", " "), points, colour)
+    for color, (name, points) in zip(_COLORS, curves.items(), strict=True):
+        _curve(left, name.replace("_", " "), points, color)
     left.set(
         xlabel="level of the sound at the array over the noise (dB)",
         ylabel="frames of 25 ms",
@@ -55,12 +55,10 @@ def plot_detection(
     return figure
 
 
-def _curve(
-    axes: Axes, name: str, points: Sequence[DetectionPoint], colour: str
-) -> None:
+def _curve(axes: Axes, name: str, points: Sequence[DetectionPoint], color: str) -> None:
     levels = [point.snr_db for point in points]
     ends = np.array([estimate_rate(each.heard, each.trials).ends for each in points])
-    axes.fill_between(levels, *ends.T, color=colour, alpha=0.2, linewidth=0)
+    axes.fill_between(levels, *ends.T, color=color, alpha=0.2, linewidth=0)
     heard = [point.heard / point.trials for point in points]
     wrong = [point.wrong / point.trials for point in points]
     for shares, line, what in (
@@ -68,7 +66,7 @@ def _curve(
         (wrong, "x:", "in a wrong place"),
     ):
         label = f"{name}, {what}"
-        axes.plot(levels, shares, line, color=colour, markersize=4.0, label=label)
+        axes.plot(levels, shares, line, color=color, markersize=4.0, label=label)
 
 
 def _false_alarms(
@@ -83,7 +81,7 @@ def _false_alarms(
         yerr=np.stack((shares - ends[:, 0], ends[:, 1] - shares)),
         fmt="o",
         markersize=4.0,
-        color=COLOURS["robot"],
+        color=COLORS["robot"],
         label=f"{alarms[0].frames} frames of noise",
     )
     silent = [alarm for alarm in alarms if not alarm.count]
@@ -91,12 +89,12 @@ def _false_alarms(
         [alarm.rate for alarm in silent],
         [estimate_rate(0, alarm.frames).high for alarm in silent],
         "v",
-        color=COLOURS["robot"],
+        color=COLORS["robot"],
         label="none heard: below",
     )
     line = np.array([default_rate / 3.0, 1.0])
-    axes.plot(line, line, color=COLOURS["empty"], linewidth=1.0, label="as set")
-    axes.axvline(default_rate, color=COLOURS["source"], linestyle="--", label="default")
+    axes.plot(line, line, color=COLORS["empty"], linewidth=1.0, label="as set")
+    axes.axvline(default_rate, color=COLORS["source"], linestyle="--", label="default")
     axes.set(xscale="log", yscale="log", xlim=line, ylim=(0.3 / alarms[0].frames, 1.3))
     axes.set_xlabel("false-alarm rate that is set")
     axes.set_ylabel("share of the frames in which a sound is heard")

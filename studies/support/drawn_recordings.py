@@ -96,14 +96,14 @@ def draw_array(
         kind = _KINDS[rng.integers(3)]
         aperture = math.exp(rng.uniform(*np.log(_APERTURES_M)))
         shape = _shape(kind, aperture, rng)
-        centre = np.array([3.5, 4.5, 1.5]) + rng.uniform(-0.5, 0.5, 3)
-        source = centre + _offset(shape, kind, rng)
+        center = np.array([3.5, 4.5, 1.5]) + rng.uniform(-0.5, 0.5, 3)
+        source = center + _offset(shape, kind, rng)
         inside = np.all(source > _FROM_WALLS_M) and np.all(
             source < ROOM_M - _FROM_WALLS_M
         )
         if not inside:
             continue
-        drawn = _drawn(kind, shape + centre, source, cell, rng)
+        drawn = _drawn(kind, shape + center, source, cell, rng)
         error = range_bound(drawn, np.zeros((len(shape) - 1,) * 2)) / drawn.range_m
         if error < largest_error:
             return drawn

@@ -26,7 +26,7 @@ def ring_scene(
     Args:
         from_deg: Bearing of the first place, deg.
         to_deg: Bearing up to which they reach, deg; larger.
-        step_deg: Between neighbours, deg.
+        step_deg: Between neighbors, deg.
         distance_m: From the array, m.
         elevation_deg: Above it, deg.
         t60_s: Reverberation time, s.
@@ -40,7 +40,7 @@ def ring_scene(
         bearings_deg=tuple((from_deg + step_deg * np.arange(count)).tolist()),
         elevations_deg=(elevation_deg,) * count,
         distances_m=(distance_m,) * count,
-        centre_m=(3.0, 2.5, 1.2),
+        center_m=(3.0, 2.5, 1.2),
         t60_s=t60_s,
         snr_db=snr_db,
     )

@@ -51,7 +51,7 @@ def by_tdoa(*, phat: bool) -> Estimator:
     """``pyroomacoustics.experimental.tdoa`` and our closed form.
 
     It takes no band. With 16 points a sample its lags end at 156 samples, less
-    than sound can take along the row: delays are those of neighbours.
+    than sound can take along the row: delays are those of neighbors.
     """
     step = 1.0 / (INTERPOLATION * SAMPLE_RATE_HZ)
     covariance = step**2 / 12.0 * np.array([[1.0, 1.0], [1.0, 2.0]])

@@ -46,7 +46,7 @@ class TalkerScene:
     """As many, deg."""
     distances_m: tuple[float, ...]
     """As many, m."""
-    centre_m: tuple[float, float, float]
+    center_m: tuple[float, float, float]
     """Of the array, in the room."""
     t60_s: float = 0.3
     """Reverberation time by Sabine's formula, s; 0: the free field."""
@@ -67,7 +67,7 @@ def draw_talkers(
     Args:
         rng: Draws the first bearing, the distances, heights and the array's place.
         talkers: Their number.
-        separation_deg: Between neighbours, deg.
+        separation_deg: Between neighbors, deg.
         t60_s: Reverberation time, s.
         snr_db: Over the noise, dB.
 
@@ -88,7 +88,7 @@ def draw_talkers(
         bearings_deg=tuple(bearings.tolist()),
         elevations_deg=tuple(rng.uniform(0.0, 20.0, talkers).tolist()),
         distances_m=tuple(rng.uniform(1.0, 2.0, talkers).tolist()),
-        centre_m=(float(x), float(y), float(z)),
+        center_m=(float(x), float(y), float(z)),
         t60_s=t60_s,
         snr_db=snr_db,
     )
@@ -108,7 +108,7 @@ def record_talkers(
 
     Args:
         scene: Places, room and noise.
-        microphones: (n, 3) about the array's centre, m.
+        microphones: (n, 3) about the array's center, m.
         rng: Draws the voices and the noise.
         seconds: How long.
         sample_rate_hz: Of the recording, Hz.
@@ -184,7 +184,7 @@ def impulse_responses(
 
     Args:
         scene: Places and room.
-        microphones: (n, 3) about the array's centre, m.
+        microphones: (n, 3) about the array's center, m.
         sample_rate_hz: Of the responses, Hz.
         c: Speed of sound, m/s.
 
@@ -203,10 +203,10 @@ def impulse_responses(
         max_order=min(order, _MOST_REFLECTIONS),
     )
     room.set_sound_speed(c)
-    centre = np.array(scene.centre_m)
+    center = np.array(scene.center_m)
     for distance, direction in zip(scene.distances_m, _directions(scene), strict=True):
-        room.add_source(centre + distance * direction)
-    room.add_microphone_array((np.asarray(microphones, dtype=np.float64) + centre).T)
+        room.add_source(center + distance * direction)
+    room.add_microphone_array((np.asarray(microphones, dtype=np.float64) + center).T)
     room.compute_rir()
     length = max(len(response) for row in room.rir for response in row)
     responses = np.zeros((len(scene.distances_m), len(room.rir), length))

@@ -118,7 +118,7 @@ def _block_force(
         echo = ranges <= case.follower.ultrasonic.maximum_range_m
         points = echo_points(ranges.tolist(), echo.tolist(), case.follower.ultrasonic)
         vectors = collision_vectors(
-            points, case.follower.collision_vector, case.follower.ultrasonic.neighbours
+            points, case.follower.collision_vector, case.follower.ultrasonic.neighbors
         )
     p_WP, p_WS = control_point(pose, offset), case.source.path().pose(0.0)[:2]
     F_m = attraction_force(

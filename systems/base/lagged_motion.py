@@ -76,7 +76,7 @@ def lagged_motion(duration_s: float, lag_s: float) -> LaggedMotion:
 
 
 @register_jitable
-def advance_pose(pose: Any, travelled: Any, steady: Any, motion: LaggedMotion) -> Any:
+def advance_pose(pose: Any, traveled: Any, steady: Any, motion: LaggedMotion) -> Any:
     """Computes the pose after a period in which the wheel command was held.
 
     The path and the turn of the body each have a steady part and a lagged part, see
@@ -86,7 +86,7 @@ def advance_pose(pose: Any, travelled: Any, steady: Any, motion: LaggedMotion) -
     Args:
         pose: (x, y, theta) at the start in the world frame W, m and rad; floats or
             AutoDiffXd.
-        travelled: (length, turn): actual path length and turn of the body in the
+        traveled: (length, turn): actual path length and turn of the body in the
             period, m and rad.
         steady: (length, turn) that would result if the wheels ran at their commanded
             speeds from the start, m and rad.
@@ -95,11 +95,11 @@ def advance_pose(pose: Any, travelled: Any, steady: Any, motion: LaggedMotion) -
     Returns:
         (x, y, theta) at the end in W, m and rad.
     """
-    lagged_way, lagged_turn = travelled[0] - steady[0], travelled[1] - steady[1]
+    lagged_way, lagged_turn = traveled[0] - steady[0], traveled[1] - steady[1]
     x, y, theta = pose[0], pose[1], pose[2]
     for steady_share, lagged_share, steady_weight, lagged_weight in motion.nodes:
         heading = theta + steady[1] * steady_share + lagged_turn * lagged_share
         step = steady[0] * steady_weight + lagged_way * lagged_weight
         x = x + step * cos(heading)
         y = y + step * sin(heading)
-    return x, y, theta + travelled[1]
+    return x, y, theta + traveled[1]

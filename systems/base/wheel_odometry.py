@@ -58,15 +58,15 @@ def odometry_step(
     if tick == numbers.lost_tick:
         then = 0.0 * then[0], 0.0 * then[1], 0.0 * then[2]
     turned = left - state[3], right - state[4]
-    travelled = body_twist(turned, robot)
-    steady = travelled
+    traveled = body_twist(turned, robot)
+    steady = traveled
     # If the wheels have not moved since the update, the motion is zero.
     if turned[0] != 0.0 or turned[1] != 0.0:
         top = robot.top_wheel_speed
         steady_left = motion.duration_s * saturated(inputs[1][0], top)
         steady_right = motion.duration_s * saturated(inputs[1][1], top)
         steady = body_twist((steady_left, steady_right), robot)
-    now = advance_pose(then, travelled, steady, motion)
+    now = advance_pose(then, traveled, steady, motion)
     pose, velocity = outputs
     for k in range(3):
         pose[k] = now[k]

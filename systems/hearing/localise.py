@@ -209,8 +209,8 @@ class Localiser:
         # Uneven pairs: the two microphones have different distances from a source
         # straight ahead of the centroid.
         i, j = plan.shape.pairs.T
-        from_centre = np.linalg.norm(plan.shape.p_AM, axis=1)
-        self._uneven = np.abs(from_centre[i] - from_centre[j]) > _ALIKE_M
+        from_center = np.linalg.norm(plan.shape.p_AM, axis=1)
+        self._uneven = np.abs(from_center[i] - from_center[j]) > _ALIKE_M
         self._all = np.ones(len(i), dtype=bool)
         # Factor that converts the average energy of one channel, on one side of the
         # spectrum, to the energy of all channels and samples, on both sides.

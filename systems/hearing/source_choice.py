@@ -213,13 +213,13 @@ class SourceChoice:
         if not candidates:
             return None, memory._replace(others=tuple(others))
         # Costs of each sound for each known source.
-        centre, turn, line = self._array(belief.pose)
-        microphones = centre + self._shape.p_AM @ turn.T
+        center, turn, line = self._array(belief.pose)
+        microphones = center + self._shape.p_AM @ turn.T
         places = [None if o is None else o.grown() for o in others]
         costs = np.array(
             [[self._cost(c, p, microphones) for p in places] for c in candidates]
         )
-        followed = self._followed(belief, memory, centre, turn)
+        followed = self._followed(belief, memory, center, turn)
         own = np.full(len(candidates), math.inf)
         if may_sound and followed is not None:
             own = np.array([self._cost(c, followed, microphones) for c in candidates])
@@ -246,7 +246,7 @@ class SourceChoice:
         chosen = belongs.index(0) if 0 in belongs else None
         for candidate, place in zip(candidates, belongs, strict=True):
             if place != 0:
-                where = self._located(candidate, centre, turn, line)
+                where = self._located(candidate, center, turn, line)
                 _remember(others, place, where)
         if chosen is None or _is_ambiguous(chosen, own, belongs, candidates):
             return None, memory._replace(others=tuple(others))
@@ -264,19 +264,19 @@ class SourceChoice:
         """Returns the microphones' centroid in W, R_WB, and the line of the row."""
         cosine, sine = math.cos(pose[2]), math.sin(pose[2])
         turn = np.array([[cosine, -sine], [sine, cosine]])
-        centre = pose[:2] + turn @ self._p_BA
+        center = pose[:2] + turn @ self._p_BA
         ahead = self._shape.ahead
         return (
-            centre,
+            center,
             turn,
-            _Line(centre, np.zeros(2) if ahead is None else turn @ ahead),
+            _Line(center, np.zeros(2) if ahead is None else turn @ ahead),
         )
 
     def _followed(
         self,
         belief: Belief,
         memory: ChoiceMemory,
-        centre: NDArray[np.float64],
+        center: NDArray[np.float64],
         turn: NDArray[np.float64],
     ) -> _Place | None:
         """Returns the expected position of the followed source; None: unknown."""
@@ -287,8 +287,8 @@ class SourceChoice:
             return None
         angle = self._first_bearing
         u = turn @ np.array([math.cos(angle), math.sin(angle)])
-        p, covariance = _placed(centre, u, _BEARING**2 * (np.eye(2) - np.outer(u, u)))
-        return _Place(p, covariance, _Line(centre, np.zeros(2)))
+        p, covariance = _placed(center, u, _BEARING**2 * (np.eye(2) - np.outer(u, u)))
+        return _Place(p, covariance, _Line(center, np.zeros(2)))
 
     def _cost(
         self,
@@ -320,7 +320,7 @@ class SourceChoice:
     def _located(
         self,
         candidate: Candidate,
-        centre: NDArray[np.float64],
+        center: NDArray[np.float64],
         turn: NDArray[np.float64],
         line: _Line,
     ) -> _Place:
@@ -328,8 +328,8 @@ class SourceChoice:
         fix = candidate.fix
         p, covariance = turn @ fix.p_AS, turn @ fix.covariance @ turn.T
         if fix.range_valid:
-            return _Place(p + centre, covariance, line)
-        return _Place(*_placed(centre, p, covariance), line)
+            return _Place(p + center, covariance, line)
+        return _Place(*_placed(center, p, covariance), line)
 
 
 def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
@@ -395,13 +395,13 @@ def _remember(others: list[_Other | None], number: int | None, place: _Place) ->
 
 
 def _placed(
-    centre: NDArray[np.float64],
+    center: NDArray[np.float64],
     u: NDArray[np.float64],
     covariance: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Returns the position of a source with unknown range, and its covariance."""
     along = np.outer(u, u) / 4.0
-    return centre + _RANGE_M * u, _RANGE_M**2 * (covariance + along)
+    return center + _RANGE_M * u, _RANGE_M**2 * (covariance + along)
 
 
 def _expected_delays(

@@ -255,11 +255,11 @@ def ImpedanceController_(T):
         outputs depend on the state and the present input. There is no latency.
 
         Args:
-            law: A law of ``systems.laws.catalogue`` that has a force, or a function
+            law: A law of ``systems.laws.catalog`` that has a force, or a function
                 ``law(c, s, gains)``. The function returns the force away from the
                 obstacle in N for a distance c in m and a speed s in m/s. It must use
                 pydrake.math, so that Drake can differentiate it.
-            gains: Gains of the law. If None, a law of the catalogue uses its default
+            gains: Gains of the law. If None, a law of the catalog uses its default
                 gains.
             velocity_term: Definition of s: ``printed`` for the rate of change of the
                 collision vector, ``closing`` for the speed of approach.

@@ -64,7 +64,7 @@ class Tuning:
 
 @dataclass(frozen=True)
 class Law:
-    """One law. ``systems.laws.catalogue`` lists them all."""
+    """One law. ``systems.laws.catalog`` lists them all."""
 
     name: str
     """Name of the law in scenarios."""
@@ -103,7 +103,7 @@ class Law:
     """
     guarded: bool = False
     """Whether the robot of this law always has the guard."""
-    colour: str | None = None
+    color: str | None = None
     """Color in pictures. None: the next color of the palette."""
 
     @property

@@ -116,7 +116,7 @@ def foot_on_segment(a: Any, b: Any) -> Any:
 
 
 def collision_vectors(
-    points: Any, parameters: CollisionVectorParameters, neighbours: Any = None
+    points: Any, parameters: CollisionVectorParameters, neighbors: Any = None
 ) -> Any:
     """Computes collision vectors from the positions of the echoes.
 
@@ -129,7 +129,7 @@ def collision_vectors(
         points: List with one entry per sensor, from left to right. An entry is the
             position (x, y) of the echo relative to P, m, or None without an echo.
         parameters: Rule that combines echoes into vectors.
-        neighbours: Pairs of adjacent sensors (``UltrasonicParameters.neighbours``). A
+        neighbors: Pairs of adjacent sensors (``UltrasonicParameters.neighbors``). A
             pair has two indices, counted from 0, with the left sensor first. None: each
             sensor is paired with the next sensor.
 
@@ -139,19 +139,19 @@ def collision_vectors(
         Feature n + k is the pair of sensor k, counted from 1, and its right neighbor
         (case II, eq. 14).
     """
-    if neighbours is None:
-        neighbours = pairwise(range(len(points)))
+    if neighbors is None:
+        neighbors = pairwise(range(len(points)))
     return _vectors(
         [(0.0, 0.0) if point is None else point for point in points],
         [point is not None for point in points],
-        [*neighbours],
+        [*neighbors],
         joined=parameters.aggregation == "paper",
         every=parameters.aggregation == "sum",
     )
 
 
 @register_jitable
-def _vectors(points, heard, neighbours, joined, every):
+def _vectors(points, heard, neighbors, joined, every):
     """Computes the results of ``collision_vectors``, in a form that compiles.
 
     ``heard`` has one flag per sensor, true if the sensor has an echo. The position of a
@@ -174,7 +174,7 @@ def _vectors(points, heard, neighbours, joined, every):
     # Keep pairs of adjacent sensors whose echoes are close enough to each other.
     pairs = [
         (int(pair[0]), int(pair[1]))
-        for pair in neighbours
+        for pair in neighbors
         if heard[int(pair[0])]
         and heard[int(pair[1])]
         and _close(points[int(pair[0])], points[int(pair[1])])
@@ -293,7 +293,7 @@ class CollisionNumbers(NamedTuple):
     """Directions of the sensors in B, rad."""
     places: list[tuple[float, float]]
     """Positions (x, y) of the sensors relative to P, in the axes of the body B, m."""
-    neighbours: list[tuple[int, int]]
+    neighbors: list[tuple[int, int]]
     """Pairs of adjacent sensors, counted from 0, each with the left sensor first."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
@@ -331,7 +331,7 @@ def collision_step(
     vectors = _vectors(
         points,
         [flag > 0.5 for flag in echo],
-        numbers.neighbours,
+        numbers.neighbors,
         numbers.joined,
         numbers.every,
     )
@@ -400,7 +400,7 @@ def CollisionVector_(T):
                 parameters.aggregation == "sum",
                 [*sensors.axes],
                 [*sensors.places],
-                [*sensors.neighbours],
+                [*sensors.neighbors],
                 robot.control_point_m,
                 tick_s,
             )

@@ -178,7 +178,7 @@ def _numbers(
     sensors: UltrasonicParameters, robot: RobotParameters, tick_s: float
 ) -> DetectorNumbers:
     apart = np.zeros(sensors.count)
-    for left, right in sensors.neighbours:
+    for left, right in sensors.neighbors:
         apart[left] = (sensors.axes[left] - sensors.axes[right]) % math.tau
     axes, places, _ = sensors.beams
     return DetectorNumbers(

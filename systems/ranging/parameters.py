@@ -48,7 +48,7 @@ OBJECT_SLOTS, OBJECT_SIZE = 8, 8
 
 #: Two adjacent sensors are neighbors if their directions differ by at most this angle,
 #: deg.
-NEIGHBOURS_DEG = 90.0
+NEIGHBORS_DEG = 90.0
 
 
 class RangeSensorParameters(Parameters):
@@ -180,13 +180,13 @@ class UltrasonicParameters(Parameters):
         return np.array([getattr(sensor, field) for sensor in self.sensors])
 
     @cached_property
-    def neighbours(self) -> tuple[tuple[int, int], ...]:
+    def neighbors(self) -> tuple[tuple[int, int], ...]:
         """Pairs of adjacent sensors, counted from 0, with the left sensor first."""
         around = [*self.axes_deg, self.axes_deg[0] - 360.0]
         pairs = [
             (k, (k + 1) % self.count)
             for k, (left, right) in enumerate(pairwise(around))
-            if left - right <= NEIGHBOURS_DEG
+            if left - right <= NEIGHBORS_DEG
         ]
         return tuple(pair for pair in pairs if pair[0] != pair[1])
 

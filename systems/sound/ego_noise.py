@@ -81,8 +81,8 @@ def _read_loops(file: str, count: int, rate_hz: float) -> NDArray[np.float32]:
     """Reads (1 or n, length) samples at ``rate_hz``, of unit RMS over all channels."""
     field = "microphones.ego_noise_file"
     channels, rate = read_noise(file, count, field)
-    centred = channels - channels.mean(axis=1, keepdims=True)
-    resampled = soxr.resample(centred.T, rate, SAMPLE_RATE_HZ, quality="VHQ").T
+    centered = channels - channels.mean(axis=1, keepdims=True)
+    resampled = soxr.resample(centered.T, rate, SAMPLE_RATE_HZ, quality="VHQ").T
     heard = np.array([band_limited(row, *MICROPHONE_BAND_HZ) for row in resampled])
     if np.std(heard) <= 1e-6 * np.abs(channels).max():
         low, high = MICROPHONE_BAND_HZ

@@ -118,8 +118,8 @@ def _siren(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 
 def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
     samples, rate = read_played(sound.file or "", sound.low_hz, "sound.file")
-    centred = samples - samples.mean()
-    mono = soxr.resample(centred, rate, SAMPLE_RATE_HZ, quality="VHQ")
+    centered = samples - samples.mean()
+    mono = soxr.resample(centered, rate, SAMPLE_RATE_HZ, quality="VHQ")
     threshold = np.max(np.abs(mono)) * 10.0 ** (SILENCE_DB / 20.0)
     return mono[np.argmax(np.abs(mono) > threshold) :]
 

@@ -34,18 +34,18 @@ def test_bias_and_decay_of_a_stable_contact(law):
     for term, run in found.runs.items():
         predicted = found.predictions[term]
         assert predicted.limit_cycle is None
-        # The first cycle comes from rest, the last ones are a few millimetres.
+        # The first cycle comes from rest, the last ones are a few millimeters.
         inner = slice(1, -1)
-        for amplitude, centre, growth in zip(
+        for amplitude, center, growth in zip(
             run.amplitudes_m[inner],
-            run.centres_m[inner],
+            run.centers_m[inner],
             run.growth_per_s[inner],
             strict=True,
         ):
             if amplitude < 0.01:
                 continue
-            expected_centre, expected_growth, _ = predicted.at(float(amplitude))
-            assert centre == pytest.approx(expected_centre, abs=2.5e-3)
+            expected_center, expected_growth, _ = predicted.at(float(amplitude))
+            assert center == pytest.approx(expected_center, abs=2.5e-3)
             assert growth == pytest.approx(expected_growth, abs=2e-3)
         omega = predicted.at(0.05)[2]
         assert np.mean(run.frequencies_rad_s) == pytest.approx(omega, rel=0.02)
@@ -58,10 +58,10 @@ def test_limit_cycle_of_a_contact_that_is_too_stiff():
     found = contact_oscillation(case, to_go_m=1.0, start_m=0.75, duration_s=120.0)
     predicted, run = found.predictions["printed"], found.runs["printed"]
     assert predicted.limit_cycle is not None
-    amplitude, centre, frequency = predicted.limit_cycle
+    amplitude, center, frequency = predicted.limit_cycle
     assert amplitude < predicted.clamp_amplitude_m
     assert run.settled_amplitude_m == pytest.approx(amplitude, rel=0.05)
-    assert run.centres_m[-3:].mean() == pytest.approx(centre, abs=5e-3)
+    assert run.centers_m[-3:].mean() == pytest.approx(center, abs=5e-3)
     assert run.frequencies_rad_s[-3:].mean() == pytest.approx(frequency, rel=0.02)
     assert found.runs["closing"].settled_amplitude_m < 0.02
 

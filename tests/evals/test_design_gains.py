@@ -9,7 +9,7 @@ import pytest
 
 from analysis.batches.comparison_plans import comparison_plan
 from analysis.loops.push_and_pull import DESIGNED_LAWS
-from analysis.stability.requirements import Requirements, metres_to_go
+from analysis.stability.requirements import Requirements, meters_to_go
 from diagrams import load_scenario, simulate
 from diagrams.scenario.scenario import Scenario
 from phonotaxis import main
@@ -31,7 +31,7 @@ def run_at_wall(law: str, share: float):
     gains = getattr(Scenario().follower.laws, law).model_dump()
     for field in SPRINGS[law]:
         gains[field] *= share
-    to_go = metres_to_go(Scenario(), Requirements())
+    to_go = meters_to_go(Scenario(), Requirements())
     source = WALL_X + to_go + Scenario().follower.attraction.follow_distance_m
     return simulate(
         Scenario.model_validate(

@@ -1,4 +1,4 @@
-"""The closed loop in a room that reverberates, with coloured ego noise."""
+"""The closed loop in a room that reverberates, with colored ego noise."""
 
 from __future__ import annotations
 

@@ -230,7 +230,7 @@ def test_a4_what_is_forgotten_beside_it_is_not_driven_into():
     assert outcome.disc_m > 0.03
 
 
-# A5: braking is never weaker than modelled.
+# A5: braking is never weaker than modeled.
 
 
 def braking_way(friction: float | None, speed: float = 0.72) -> float:

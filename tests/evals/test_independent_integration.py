@@ -21,7 +21,7 @@ from systems import (
     ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
-from systems.laws import catalogue
+from systems.laws import catalog
 from systems.laws.active import active_force
 from systems.laws.active_2017 import active_2017_force
 from systems.laws.conventional import conventional_force
@@ -164,11 +164,11 @@ def nearest_vector(p: np.ndarray, time: float) -> tuple[int, np.ndarray] | None:
         (source_position(time), 0.0, SOURCE_SIZE),
     ]
     vectors = []
-    for centre, heading, size in bodies:
+    for center, heading, size in bodies:
         R = rotation(heading)
-        local = R.T @ (p - centre)
+        local = R.T @ (p - center)
         half = np.array(size) / 2
-        vectors.append(R @ np.clip(local, -half, half) + centre - p)
+        vectors.append(R @ np.clip(local, -half, half) + center - p)
     distances = [np.linalg.norm(v) for v in vectors]
     index = int(np.argmin(distances))
     return (index, vectors[index]) if distances[index] <= 3.0 else None
@@ -339,7 +339,7 @@ BLOCKS: dict[str, Any] = {
 
 
 def gains_of(law: str) -> Any:
-    model: Any = catalogue.LAWS[law].gains
+    model: Any = catalog.LAWS[law].gains
     return model.model_validate(REPULSION[law])
 
 

@@ -123,5 +123,5 @@ def test_exported_models_have_the_poles_of_the_document(report, document):
     )
 
 
-def test_effective_scenario_can_be_analysed_again(report):
+def test_effective_scenario_can_be_analyzed_again(report):
     assert load_scenario(report / "scenario.yaml").only.law == "conventional"

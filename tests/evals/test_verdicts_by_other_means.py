@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from analysis.energy.certificate_trials import try_certificate
 from analysis.energy.energy_certificate import certify_energy
-from analysis.loops import linearisation
+from analysis.loops import linearization
 from analysis.loops.burst_cycle import burst_cycle
 from analysis.loops.delay_margin import DELAY_PLACES, delay_margin
 from analysis.loops.equilibria import find_equilibria
@@ -31,7 +31,7 @@ from analysis.loops.robustness import (
     following_uncertainty,
     pole_cloud,
 )
-from analysis.stability.law_analysis import Study, analyse_law
+from analysis.stability.law_analysis import Study, analyze_law
 from analysis.stability.linear_parts import count_jams
 from analysis.stability.report_parts import SOUND_PARTS
 from analysis.stability.robustness_parts import LoopRobustness
@@ -50,7 +50,7 @@ def studies():
     found = {}
     for law in LAWS:
         scenario = load_scenario("default", [f"law={law}"])
-        analysis = analyse_law(scenario, wanted)
+        analysis = analyze_law(scenario, wanted)
         found[law] = Study(scenario, found=analysis.found)
     return found
 
@@ -119,7 +119,7 @@ def test_growth_at_rest_is_that_of_simulated_steps(studies, law):
     matrix = np.zeros((len(at.state), len(at.state)))
     for k, name in enumerate(loop.state_names):
         # Covariances of exact hearing are zero, and cannot be stepped down.
-        if linearisation._can_step(name):
+        if linearization._can_step(name):
             sides = []
             for sign in (1.0, -1.0):
                 moved = at.state.copy()
@@ -418,7 +418,7 @@ def test_power_of_the_velocity_term_by_search(studies, law):
 
 
 def bodies(scenario):
-    """(n, 4) x and y of centre, half extents in x and y; none stands askew."""
+    """(n, 4) x and y of center, half extents in x and y; none stands askew."""
     found = []
     for x, y, theta, length, width in (
         body.rectangle(0.0) for body in scenario.bodies().values()
@@ -574,13 +574,13 @@ def test_difference_of_two_routes_shows_an_error_in_one(studies, monkeypatch):
     study = studies["conventional"]
     name = "difference between two computations of the model"
     assert read(name, study.found["linear_models"]) < 1e-12
-    true = linearisation.blockwise_model
+    true = linearization.blockwise_model
 
     def wrong(point):
         model = true(point)
         model.A[3, 2] += 1e-6
         return model
 
-    monkeypatch.setattr(linearisation, "blockwise_model", wrong)
-    routes = linearisation.compare_routes(study.found["equilibria"].at)
+    monkeypatch.setattr(linearization, "blockwise_model", wrong)
+    routes = linearization.compare_routes(study.found["equilibria"].at)
     assert read(name, Made(routes=routes)) == pytest.approx(1e-6, rel=1e-3)

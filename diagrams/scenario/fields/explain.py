@@ -12,7 +12,7 @@ from diagrams.scenario.fields.near_miss import near_field
 from diagrams.scenario.former_fields import constant_now
 from diagrams.scenario.shorthand import ROBOT_FIELDS
 from systems.framework.input_error import InputError, shortened
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 #: What robots of each kind do, for messages.
 _KINDS = {

@@ -10,7 +10,7 @@ from diagrams.scenario.suggestions import did_you_mean
 
 #: Groups of synonyms with different letters; scenarios use one word of each group.
 _SAME_THING = (
-    ("position", "location", "place", "pose", "centre", "center", "xy", "waypoints"),
+    ("position", "location", "place", "pose", "center", "center", "xy", "waypoints"),
     ("size", "dimensions", "extent", "extents"),
     ("speed", "velocity"),
     ("heading", "angle", "yaw", "orientation", "theta"),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagrams.scenario.participants import Router
 from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
-from systems.laws.catalogue import ROUTE_LAWS
+from systems.laws.catalog import ROUTE_LAWS
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,
     damping_bound,

@@ -40,9 +40,9 @@ class _Microphones(NamedTuple):
 
     control_point: float
     """Distance of P ahead of the origin of B."""
-    centre_x: float
+    center_x: float
     """x of the centroid of the microphones relative to P, in B axes."""
-    centre_y: float
+    center_y: float
     """y of the centroid of the microphones relative to P, in B axes."""
     ahead_x: float
     """x of the normal of the row, in B axes. It has no effect without a row."""
@@ -96,7 +96,7 @@ def tracker_numbers(
     Returns:
         Constants for ``track_step``.
     """
-    centre_P = np.mean(robot.microphones_m, axis=0).tolist()
+    center_P = np.mean(robot.microphones_m, axis=0).tolist()
     ahead = ArrayShape.of(robot.microphones_m).ahead
     both = resolve_front_back and ahead is not None
     ahead_B = (1.0, 0.0) if ahead is None else ahead.tolist()
@@ -107,7 +107,7 @@ def tracker_numbers(
         max(2, math.ceil(age_ticks)),
         age_ticks,
         round(frame_s / tick_s),
-        _Microphones(robot.control_point_m, *centre_P, *ahead_B),
+        _Microphones(robot.control_point_m, *center_P, *ahead_B),
         FilterSettings(floor_m, measurement_age_s),
         tick_s * ages(2 if both else 1),
     )
@@ -224,7 +224,7 @@ def _sighting(
     c, s = np.cos(pose[2]), np.sin(pose[2])
     x_P = pose[0] + microphones.control_point * c
     y_P = pose[1] + microphones.control_point * s
-    dx, dy = _turned(c, s, microphones.centre_x, microphones.centre_y)
+    dx, dy = _turned(c, s, microphones.center_x, microphones.center_y)
     nx, ny = _turned(c, s, microphones.ahead_x, microphones.ahead_y)
     x, y = _turned(c, s, p_PS_B[0], p_PS_B[1])
     if ranged > 0.0:

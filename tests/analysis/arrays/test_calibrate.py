@@ -200,7 +200,7 @@ def test_mean_of_stretches_counts_their_scatter(scale):
     root = np.linalg.cholesky(covariance)
     off, said = [], []
     for _ in range(200):
-        # Stretches overlap by half: neighbours share half of their noise.
+        # Stretches overlap by half: neighbors share half of their noise.
         noise = rng.standard_normal((21, 3)) @ root.T
         tau = 1e-3 + scale * (noise[1:] + noise[:-1]) / math.sqrt(2)
         heard = heard_sound(

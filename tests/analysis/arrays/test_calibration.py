@@ -183,7 +183,7 @@ def located(places, c, sound, near):
 def test_left_out_positions_are_found():
     """A planar array of 1.4 m, 2 cm off, and nine surveyed positions.
 
-    Off by decimetres before; within 0.03 m afterwards, at 3 to 5 m.
+    Off by decimeters before; within 0.03 m afterwards, at 3 to 5 m.
     """
     rng = np.random.default_rng(5)
     before, after = [], []

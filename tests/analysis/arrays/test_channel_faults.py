@@ -164,7 +164,7 @@ def test_every_exchange_in_an_uneven_array(bearing):
     assert np.mean(seen) > 0.5
 
 
-def test_exchanged_neighbours_of_a_row():
+def test_exchanged_neighbors_of_a_row():
     """They fake a source amid the row, which would be heard at other levels."""
     samples = recording(ROW, place(ROW, 35.0, 2.0))
     assert faults(samples[[1, 0, 2]], ROW) == [("swapped", (0, 1))]
@@ -290,7 +290,7 @@ def test_unequal_gains_that_were_stated_are_no_fault():
 
 
 def test_misplaced_microphones_that_were_stated_are_no_fault():
-    """As far off as an exchange of neighbours would put them."""
+    """As far off as an exchange of neighbors would put them."""
     samples = recording(SQUARE, place(SQUARE, 35.0, 2.0))[[1, 0, 2, 3]]
     assert [f.kind for f in found_faults(samples, SQUARE)] == ["swapped"]
     assert found_faults(samples, SQUARE, position_std=0.15) == []

@@ -224,8 +224,8 @@ def test_maximum_likelihood_reaches_the_bound():
         spectra = steering(p_AS) * spectrum + np.fft.rfft(white)[:, band]
         fit = least_squares(misfit, p_AS, args=(spectra,), x_scale=0.01)
         errors.append(fit.x - p_AS)
-    normalised = np.einsum(
+    normalized = np.einsum(
         "ti,ij,tj->t", errors, np.linalg.inv(bound.covariance), np.array(errors)
     )
     # Mean 2 and standard deviation 2 a trial: four standard errors.
-    assert np.mean(normalised) == pytest.approx(2.0, abs=4.0 * 2.0 / trials**0.5)
+    assert np.mean(normalized) == pytest.approx(2.0, abs=4.0 * 2.0 / trials**0.5)

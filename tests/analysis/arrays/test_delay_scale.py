@@ -8,7 +8,7 @@ import pytest
 from analysis.arrays.frame_delays import DelayScale, FrameDelays, delay_scale
 from systems.sound.array_shape import ArrayShape
 
-METRES_PER_SAMPLE = 340.0 / 16_000.0
+METERS_PER_SAMPLE = 340.0 / 16_000.0
 
 # A square of 65 mm across, and four microphones in space within 94 mm.
 SQUARE = 0.02285 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1.0]])
@@ -20,7 +20,7 @@ def lags(places, direction, frames=20, noise=0.05, seed=0):
     p = np.pad(places, ((0, 0), (0, 3 - places.shape[1])))
     i, j = np.triu_indices(len(p), 1)
     u = np.array(direction) / np.linalg.norm(direction)
-    exact = (p[i] - p[j]) @ u / METRES_PER_SAMPLE
+    exact = (p[i] - p[j]) @ u / METERS_PER_SAMPLE
     rng = np.random.default_rng(seed)
     each = rng.normal(0.0, noise, (frames, len(p)))
     return exact + each[:, j] - each[:, i]
@@ -28,7 +28,7 @@ def lags(places, direction, frames=20, noise=0.05, seed=0):
 
 def scale_of(frames, shape) -> DelayScale | None:
     levels = np.ones((len(frames), shape.count))
-    return delay_scale(FrameDelays(frames, levels, shape, METRES_PER_SAMPLE))
+    return delay_scale(FrameDelays(frames, levels, shape, METERS_PER_SAMPLE))
 
 
 @pytest.mark.parametrize("places", [SQUARE, SPACE])
@@ -65,7 +65,7 @@ def test_positions_in_a_larger_unit(times):
     paths = np.abs((big[i] - big[j]) @ u)
     longest = np.linalg.norm(big[i] - big[j], axis=1)
     # A sample is left for errors.
-    expected = ((paths - METRES_PER_SAMPLE) / (times * longest)).max()
+    expected = ((paths - METERS_PER_SAMPLE) / (times * longest)).max()
     assert found.share == pytest.approx(expected, rel=1e-6)
 
 
@@ -97,7 +97,7 @@ def test_delays_are_impossible_from_half_as_long_again(times, beyond):
     assert (found is not None) == beyond
     if found:
         edge = big[0, 0] - big[1, 0]
-        expected = (edge - METRES_PER_SAMPLE) / (0.5 * edge)
+        expected = (edge - METERS_PER_SAMPLE) / (0.5 * edge)
         assert found.share == pytest.approx(expected, rel=1e-6)
         assert found.least_range_m == 0.0
 
@@ -109,7 +109,7 @@ def test_no_delay_at_all_is_of_a_quarter_sample_at_least():
     assert found is not None
     assert (found.kind, found.share) == ("nothing", 0.0)
     aperture = np.linalg.norm(big[0] - big[2])
-    assert found.least_range_m == pytest.approx(aperture**2 / 2.0 / METRES_PER_SAMPLE)
+    assert found.least_range_m == pytest.approx(aperture**2 / 2.0 / METERS_PER_SAMPLE)
 
 
 @pytest.mark.parametrize(
@@ -146,4 +146,4 @@ def test_near_microphones_are_too_near_to_tell():
     found = scale_of(frames, ArrayShape.of(near))
     assert found is not None
     assert found.kind == "nothing"
-    assert found.share == pytest.approx(0.5 * METRES_PER_SAMPLE / 1.3, rel=0.02)
+    assert found.share == pytest.approx(0.5 * METERS_PER_SAMPLE / 1.3, rel=0.02)

@@ -39,7 +39,7 @@ def test_levels_of_a_near_source():
     assert not levels_contradict(ranges, fix, ROW)
 
 
-def test_nearer_than_a_millimetre_counts_as_one():
+def test_nearer_than_a_millimeter_counts_as_one():
     """Of 1 mm, 0.4 m and 0.8 m: 58 dB, of which equal levels have nothing."""
     fix, _ = fix_at(np.array([0.1, 0.3]))
     at_one = replace(fix, p_AS=ROW.p_AM[0])
@@ -60,7 +60,7 @@ def test_true_places_agree_with_levels_of_unequal_microphones(angle, distance, d
     assert not levels_contradict(levels, fix, ROW)
 
 
-def test_exchanged_neighbours_never_pass_for_a_near_source():
+def test_exchanged_neighbors_never_pass_for_a_near_source():
     """Off broadside, where exchanges change little, and below the 3 dB of 0.35 m."""
     near = 0
     angles, distances = np.linspace(0.25, 1.2, 40), np.linspace(1.5, 5.0, 20)
@@ -76,7 +76,7 @@ def test_exchanged_neighbours_never_pass_for_a_near_source():
     assert near >= 100
 
 
-def test_neighbours_that_may_stand_either_way_round_are_not_exchanged():
+def test_neighbors_that_may_stand_either_way_round_are_not_exchanged():
     """6 cm apart, and each known to 1 cm; known to 1 mm, they are."""
     places = np.array([[0.0, 0.5], [0.0, 0.06], [0.0, 0.0], [0.0, -0.5]])
     stated, wired = ArrayShape.of(places), places[[0, 2, 1, 3]]

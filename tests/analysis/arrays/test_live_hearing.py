@@ -111,7 +111,7 @@ def test_a_stream_that_ends_early_is_looked_at_as_well(seconds):
     assert heard.status.startswith("stopped: channels 3 and 4: their samples are equal")
 
 
-def test_positions_in_centimetres_end_it():
+def test_positions_in_centimeters_end_it():
     geometry = ArrayGeometry(
         microphones=tuple((100.0 * x, 100.0 * y) for x, y in SQUARE),
         sound_speed=SOUND_SPEED,

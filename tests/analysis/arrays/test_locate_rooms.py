@@ -15,7 +15,7 @@ from phonotaxis import locate
 
 RATE = 16_000
 ROOM_M = (6.0, 5.0, 2.8)
-CENTRE_M = np.array([2.6, 2.2, 1.2])
+CENTER_M = np.array([2.6, 2.2, 1.2])
 
 SMALL_SQUARE = [
     [0.023, 0.023, 0],
@@ -59,9 +59,9 @@ def record(path, places, bearing, elevation, distance, t60, snr_db=20.0):
         max_order=min(order, 25),
     )
     room.set_sound_speed(340.0)
-    room.add_source(CENTRE_M + distance * np.array(u), signal=words(rng))
-    centred = heard_by - heard_by.mean(axis=0)
-    room.add_microphone_array((centred + CENTRE_M).T)
+    room.add_source(CENTER_M + distance * np.array(u), signal=words(rng))
+    centered = heard_by - heard_by.mean(axis=0)
+    room.add_microphone_array((centered + CENTER_M).T)
     room.simulate()
     heard = room.mic_array.signals
     level = heard.std() * 10 ** (-snr_db / 20)

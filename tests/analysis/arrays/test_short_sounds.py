@@ -42,9 +42,9 @@ def record(path, source, seconds, t60, *, sounds=4, snr_db=40.0):
         max_order=min(order, 14),
     )
     room.set_sound_speed(C)
-    centre = np.array([2.0, 3.0, 1.5])
-    room.add_source(centre + source, signal=played)
-    room.add_microphone_array((STAR + centre).T)
+    center = np.array([2.0, 3.0, 1.5])
+    room.add_source(center + source, signal=played)
+    room.add_microphone_array((STAR + center).T)
     room.simulate()
     heard = room.mic_array.signals
     noise = np.random.default_rng(7).standard_normal(heard.shape)
@@ -67,7 +67,7 @@ def exact_star():
 
 @pytest.mark.parametrize("seconds", [0.003, 0.01, 0.05, 0.1])
 @pytest.mark.parametrize("bearing", [-25.0, 12.0])
-def test_short_sounds_five_metres_away_in_an_echoing_room(tmp_path, seconds, bearing):
+def test_short_sounds_five_meters_away_in_an_echoing_room(tmp_path, seconds, bearing):
     azimuth, height = math.radians(bearing), math.radians(10.0)
     level = 5.0 * math.cos(height)
     source = np.array(

@@ -79,7 +79,7 @@ def test_two_of_three_places_are_within_what_is_stated(places, place_std):
     """Drawn arrays, air and clocks; the interval of 150 draws."""
     rng = np.random.default_rng(17)
     stated = np.array(places, dtype=float)
-    centre = stated.mean(axis=0)
+    center = stated.mean(axis=0)
     side = {"side": "ahead"} if places is STAR else {}
     errors = {"position_std_m": place_std, "sound_speed_std": 3.43, "delay_std_s": 2e-6}
     known = geometry(places, **errors, **side).known
@@ -87,7 +87,7 @@ def test_two_of_three_places_are_within_what_is_stated(places, place_std):
     for _ in range(150):
         bearing, rise = rng.uniform(-0.8, 0.8), rng.uniform(-0.3, 0.3)
         u = [math.cos(bearing), math.sin(bearing), math.tan(rise)]
-        source = centre + rng.uniform(0.6, 3.0) * np.array(u) / np.linalg.norm(u)
+        source = center + rng.uniform(0.6, 3.0) * np.array(u) / np.linalg.norm(u)
         measured = delays(
             stated + place_std * rng.standard_normal(stated.shape),
             source,
@@ -103,7 +103,7 @@ def test_two_of_three_places_are_within_what_is_stated(places, place_std):
         bearings.append(off / fix.bearing_std)
         if fix.range_valid:
             assert fix.range_std <= 0.2 * fix.range
-            ranges.append((fix.range - np.linalg.norm(source - centre)) / fix.range_std)
+            ranges.append((fix.range - np.linalg.norm(source - center)) / fix.range_std)
     assert len(bearings) > 140
     assert len(ranges) > 40
     for all_off in (ranges, bearings):

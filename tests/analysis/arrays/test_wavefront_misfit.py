@@ -106,7 +106,7 @@ def test_a_long_row_of_three_has_nothing_to_tell_it_by(channel):
     assert late_channel(stretches, known(ROBOT)) is None
 
 
-def test_swapped_neighbours_of_four_do_not_fit():
+def test_swapped_neighbors_of_four_do_not_fit():
     stretches = sightings(SQUARE[[1, 0, 2, 3]], seed=3)
     assert late_channel(stretches, known(SQUARE)) is not None
 

@@ -11,7 +11,7 @@ from analysis.batches.comparison_plans import comparison_plan
 from analysis.batches.one_run import Task, results_table, run_task
 from analysis.batches.run_rows import with_all_robots
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import ROUTE_LAWS
+from systems.laws.catalog import ROUTE_LAWS
 
 
 def test_worst_last_and_mean():

@@ -151,7 +151,7 @@ def flows(boxes: list[Any], radius: float) -> bool:
 
 @pytest.mark.parametrize("heading", [0.0, 90.0, 200.0])
 def test_distance_from_the_start_is_from_the_axle_to_the_outline(heading):
-    """A box of 0.4 m by 0.4 m whose centre is 1 m off, along an axis of its own."""
+    """A box of 0.4 m by 0.4 m whose center is 1 m off, along an axis of its own."""
     c, s = math.cos(math.radians(heading)), math.sin(math.radians(heading))
     box = {"waypoints_m": [[c, s]], "size_m": [0.4, 0.4], "heading_deg": heading}
     assert lacks(layout([box]), start_distance_m=0.799) == ""
@@ -176,7 +176,7 @@ def test_distance_from_a_source_is_between_outlines():
 
 
 def test_distance_from_a_source_is_kept_all_the_time():
-    """A box that passes behind the source, 1 m from centre to centre."""
+    """A box that passes behind the source, 1 m from center to center."""
     box = {"waypoints_m": [[7.0, -2.0], [7.0, 2.0]], "size_m": [0.2, 0.2]}
     between = 1.0 - 0.163 - 0.1
     assert lacks(layout([box]), source_distance_m=between - 0.001) == ""

@@ -1,4 +1,4 @@
-"""Heat maps can be read: a bar, the same colours on every map, numbers in sight."""
+"""Heat maps can be read: a bar, the same colors on every map, numbers in sight."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_every_map_has_a_bar(figures):
             assert axes.get_images()[0].colorbar is not None
 
 
-def test_a_colour_means_the_same_on_every_map(figures):
+def test_a_color_means_the_same_on_every_map(figures):
     for first, second in zip(*map(_maps, figures), strict=True):
         limits = [axes.get_images()[0].get_clim() for axes in (first, second)]
         assert limits[0] == limits[1]
@@ -97,10 +97,10 @@ def test_a_large_map_has_a_bar_in_place_of_numbers():
 
 
 @pytest.mark.parametrize(
-    ("colour", "light"),
+    ("color", "light"),
     [("black", 0.0), ("white", 1.0), ("#FF0000", 0.2126), ("#777777", 0.1845)],
 )
-def test_luminance_is_that_of_the_standard(colour, light):
+def test_luminance_is_that_of_the_standard(color, light):
     """#777777 against white is 4.48 to 1, as W3C's examples say."""
-    assert luminance(to_rgb(colour)) == pytest.approx(light, abs=2e-4)
+    assert luminance(to_rgb(color)) == pytest.approx(light, abs=2e-4)
     assert 1.05 / (luminance("#777777") + 0.05) == pytest.approx(4.48, abs=0.01)

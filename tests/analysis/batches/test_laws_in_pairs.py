@@ -65,10 +65,10 @@ def test_rates_of_each_law(comparison):
     assert active.collision.value == pytest.approx(1 / 5)
     # Wilson's interval of 2 in 5, worked out from its formula.
     z, n, p = 1.959964, 5, 0.4
-    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
+    center = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    assert conventional.success.low == pytest.approx(centre - half, abs=1e-6)
-    assert conventional.success.high == pytest.approx(centre + half, abs=1e-6)
+    assert conventional.success.low == pytest.approx(center - half, abs=1e-6)
+    assert conventional.success.high == pytest.approx(center + half, abs=1e-6)
 
 
 def test_causes_say_whose_fault(comparison):

@@ -28,7 +28,7 @@ def layouts(name: str) -> list[Scenario]:
 
 
 def outline(rectangle: np.ndarray) -> np.ndarray:
-    """Points every centimetre or so along the sides."""
+    """Points every centimeter or so along the sides."""
     corners = rectangle_corners(rectangle)
     part = np.linspace(0.0, 1.0, 64)[:, None]
     sides = zip(corners, np.roll(corners, 1, axis=0), strict=True)

@@ -16,7 +16,7 @@ from analysis.energy.velocity_passivity import energy_balance
 
 
 def curves(axes):
-    """Data of the labelled lines, by label."""
+    """Data of the labeled lines, by label."""
     return {
         line.get_label(): line.get_xydata()
         for line in axes.get_lines()

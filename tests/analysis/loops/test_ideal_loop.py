@@ -155,7 +155,7 @@ def own_laws(tmp_path, monkeypatch):
     return "own_laws_for_loops"
 
 
-def test_a_users_law_is_linearised_like_ours(own_laws):
+def test_a_users_law_is_linearized_like_ours(own_laws):
     loop = rest(f"{own_laws}:smooth")
     state, time_s = loop.settled_state((0.6, 0.0, 0.0))
     found = loop.period_derivatives(

@@ -9,7 +9,7 @@ from analysis.loops.law_curves import AT_DISTANCE_M, law_curves, plot_law_curves
 from analysis.report.plain_values import plain
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS
+from systems.laws.catalog import FORCE_LAWS
 from systems.ranging.parameters import CollisionVectorParameters
 from tests.block_forces import block_force
 

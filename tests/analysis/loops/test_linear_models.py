@@ -99,7 +99,7 @@ def test_part_takes_signals_by_name():
     np.testing.assert_allclose(part.response([1.0]), 2 * model.response([1.0]))
 
 
-def test_simple_poles_leaves_out_zeros_and_neighbours():
+def test_simple_poles_leaves_out_zeros_and_neighbors():
     poles = np.array([0.0, 0.5, 0.5 + 1e-9, 0.9, 0.2 + 0.1j], dtype=complex)
     np.testing.assert_allclose(simple_poles(poles), [0.9, 0.2 + 0.1j])
 

@@ -51,8 +51,8 @@ def test_nyquist_curves_stay_out_of_the_disk(loops):
     """The disk's ends on the real axis are the disk gain margins."""
     for loop in loops:
         low, high = linear_plots._disk_ends(loop.disk.alpha)
-        centre, radius = (low + high) / 2, (high - low) / 2
-        assert np.abs(loop.response.L - centre).min() >= radius * (1 - 1e-6)
+        center, radius = (low + high) / 2, (high - low) / 2
+        assert np.abs(loop.response.L - center).min() >= radius * (1 - 1e-6)
         if loop.disk.alpha < 2.0:
             margin = 10 ** (loop.disk.gain_margin_db / 20)
             assert min(-low, -1 / high) == pytest.approx(margin, rel=1e-6)

@@ -333,7 +333,7 @@ def test_disks_lie_within_the_true_margins(cuts, law):
 def test_bearings_that_shrink_turn_the_target_along_with_the_robot(cuts, law):
     """At the sensor, across: stable down to L/(L + epsilon) of the gain.
 
-    P goes y aside and turns the robot by y/epsilon, its centre being left behind.
+    P goes y aside and turns the robot by y/epsilon, its center being left behind.
     With a share k of what hearing says across, the target moves by
     (1 - k)(y + L y/epsilon), and that must be less than y.
     """

@@ -11,7 +11,7 @@ from analysis.loops.contact_mode import contact_model, largest_contact_stiffness
 from analysis.loops.delay_margin import delay_margin
 from analysis.loops.delayed_run import check_delay_margin
 from analysis.loops.equilibria import follow_equilibrium
-from analysis.loops.linearisation import compare_routes, continuous_model
+from analysis.loops.linearization import compare_routes, continuous_model
 from analysis.loops.loop_margins import loop_margins
 from analysis.loops.open_loops import open_loop
 from analysis.loops.radial_law import radial_law

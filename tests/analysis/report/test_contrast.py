@@ -25,7 +25,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from analysis.report import palette
-from analysis.report.render import COLOURS_CSS
+from analysis.report.render import COLORS_CSS
 from analysis.views.picture import plot_trajectory
 from analysis.views.time_series import plot_time_series
 
@@ -66,8 +66,8 @@ def by_night(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.clip(matrix @ turned, 0.0, 1.0)
 
 
-def contrast(colour: Any, scheme: str = "light", behind: Any = "white") -> float:
-    red, green, blue, alpha = to_rgba(colour)
+def contrast(color: Any, scheme: str = "light", behind: Any = "white") -> float:
+    red, green, blue, alpha = to_rgba(color)
     paper = np.array(to_rgba(behind)[:3])
     ink = alpha * np.array([red, green, blue]) + (1.0 - alpha) * paper
     if scheme == "dark":
@@ -84,13 +84,13 @@ def test_ratios_are_those_of_the_standard() -> None:
 
 
 def test_pages_turn_drawings_over_by_that_filter() -> None:
-    assert "--drawing: invert(.91) hue-rotate(180deg)" in COLOURS_CSS
+    assert "--drawing: invert(.91) hue-rotate(180deg)" in COLORS_CSS
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_lines_of_every_kind_stand_out(scheme: str) -> None:
-    lines = [colour for name, colour in palette.COLOURS.items() if name != "sound"]
-    lines += [*palette.ROBOT_COLOURS, *palette.SERIES_COLOURS]
+    lines = [color for name, color in palette.COLORS.items() if name != "sound"]
+    lines += [*palette.ROBOT_COLORS, *palette.SERIES_COLORS]
     assert not [c for c in lines if contrast(c, scheme) < 3.0]
 
 
@@ -108,9 +108,9 @@ NO_RED = [
 ]
 
 
-def seen(colour: str, cones: Any) -> NDArray[np.float64]:
-    """CIE L*a*b* of a colour, under the light that white has."""
-    rgb = np.array(to_rgba(colour)[:3])
+def seen(color: str, cones: Any) -> NDArray[np.float64]:
+    """CIE L*a*b* of a color, under the light that white has."""
+    rgb = np.array(to_rgba(color)[:3])
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     to_xyz = np.array(
         [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
@@ -131,8 +131,8 @@ def test_what_stands_side_by_side_is_told_apart_by_any_eyes(cones: Any) -> None:
     ]
     names += [("passed", "lessened"), ("lessened", "hit"), ("robot", "estimate")]
     names += [("source", "estimate"), ("attraction", "repulsion")]
-    pairs = [(palette.COLOURS[a], palette.COLOURS[b]) for a, b in names]
-    pairs += combinations(palette.SERIES_COLOURS, 2)
+    pairs = [(palette.COLORS[a], palette.COLORS[b]) for a, b in names]
+    pairs += combinations(palette.SERIES_COLORS, 2)
     alike = [
         pair
         for pair in pairs
@@ -142,22 +142,22 @@ def test_what_stands_side_by_side_is_told_apart_by_any_eyes(cones: Any) -> None:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_words_in_those_colours_do_too(scheme: str) -> None:
-    for colour in {*palette.COLOURS.values(), *palette.ROBOT_COLOURS}:
-        assert contrast(palette.text_colour(colour), scheme) >= 4.5
-    assert palette.text_colour("#0072B2") == "#0072b2"
+def test_words_in_those_colors_do_too(scheme: str) -> None:
+    for color in {*palette.COLORS.values(), *palette.ROBOT_COLORS}:
+        assert contrast(palette.text_color(color), scheme) >= 4.5
+    assert palette.text_color("#0072B2") == "#0072b2"
 
 
 def literals() -> Iterator[tuple[str, str]]:
-    """Colours that product code names, with their files."""
+    """Colors that product code names, with their files."""
     for path in sorted((ROOT / "analysis").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                for colour in re.findall(r"#[0-9A-Fa-f]{6}\b", node.value):
-                    yield colour.upper(), path.name
+                for color in re.findall(r"#[0-9A-Fa-f]{6}\b", node.value):
+                    yield color.upper(), path.name
 
 
-def test_colours_named_elsewhere_stand_out_or_lie_below() -> None:
+def test_colors_named_elsewhere_stand_out_or_lie_below() -> None:
     found = [*literals()]
     assert len(found) > 40
     faint = {
@@ -166,7 +166,7 @@ def test_colours_named_elsewhere_stand_out_or_lie_below() -> None:
         if each[0] not in GROUNDS and min(contrast(each[0], s) for s in SCHEMES) < 3.0
     }
     assert not faint
-    assert {colour for colour, _ in found} >= GROUNDS.keys()
+    assert {color for color, _ in found} >= GROUNDS.keys()
 
 
 def _texts(figure: Figure) -> Iterator[Text]:
@@ -202,9 +202,9 @@ def _edges(axes: Axes, scheme: str) -> Iterator[tuple[str, float]]:
         inner = contrast(patch.get_facecolor(), scheme) if patch.get_fill() else 1.0
         yield kind, max(edge, inner) / 3.0
     for marks in axes.collections:
-        colours = np.asarray(marks.get_edgecolor())
-        if len(colours) and np.size(np.asarray(marks.get_offsets())):
-            yield str(marks.get_label()), contrast(colours[-1], scheme) / 3.0
+        colors = np.asarray(marks.get_edgecolor())
+        if len(colors) and np.size(np.asarray(marks.get_offsets())):
+            yield str(marks.get_label()), contrast(colors[-1], scheme) / 3.0
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -232,8 +232,8 @@ def test_the_faintest_estimate_can_be_seen(crossing_run) -> None:
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_words_and_rules_of_pages(scheme: str) -> None:
-    """Pairs of the pages' own colours, by day and by night."""
-    day, _, night = COLOURS_CSS.partition("@media")
+    """Pairs of the pages' own colors, by day and by night."""
+    day, _, night = COLORS_CSS.partition("@media")
     told = dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6})", day))
     if scheme == "dark":
         told |= dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6})", night))

@@ -149,7 +149,7 @@ def test_figures_are_well_formed_and_the_same_each_time() -> None:
     assert root.attrib["aria-label"] == "Text"
 
 
-def test_verdicts_have_colours_and_numbers_stand_right() -> None:
+def test_verdicts_have_colors_and_numbers_stand_right() -> None:
     cells = html(Table(["a", "b", "c"], [["pass", "Not applicable", 2.0]]))
     assert '<td class="pass">pass</td>' in cells
     assert '<td class="none">Not applicable</td>' in cells

@@ -56,7 +56,7 @@ def test_a_chain_out_of_contact_is_a_power_of_a_pair():
         np.testing.assert_allclose(chain[:, i], chain[:, 0] ** (i + 1), rtol=1e-9)
 
 
-def test_a_late_neighbour_turns_the_phase_alone():
+def test_a_late_neighbor_turns_the_phase_alone():
     omega = np.array([0.5, 2.0])
     soon, late = (
         chain_response(scenario(), [ChainLinks(K, D, 1.0, late_ticks=n)], omega)[:, 0]
@@ -158,7 +158,7 @@ def test_contacts_are_where_forces_vanish():
     np.testing.assert_allclose(-np.diff(places[-1]), found, atol=1e-12)
 
 
-def test_links_know_which_neighbours_touch():
+def test_links_know_which_neighbors_touch():
     where = scenario("trajectory_filtered")
     apart, near = chain_spacings(where)
     assert all(

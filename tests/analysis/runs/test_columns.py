@@ -12,7 +12,7 @@ import pytest
 import phonotaxis
 from analysis.runs.columns import COLUMNS, column_of, columns
 from diagrams import build_sound_follower, library_scenarios, load_scenario
-from systems.laws.catalogue import LAWS, ROUTE_LAWS
+from systems.laws.catalog import LAWS, ROUTE_LAWS
 
 #: Runs that have what no scenario of the library has.
 OTHERS: tuple[tuple[str, dict[str, Any]], ...] = (

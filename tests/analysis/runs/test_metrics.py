@@ -207,7 +207,7 @@ def test_time_to_the_goal_and_settling():
 
 
 def test_turning_on_the_spot_is_not_settled():
-    """P, 0.175 m ahead of the centre, goes 0.07 m/s at 0.4 rad/s, 0.035 at 0.2."""
+    """P, 0.175 m ahead of the center, goes 0.07 m/s at 0.4 rad/s, 0.035 at 0.2."""
     still = np.full(161, 2.4)
     time = TICK * np.arange(161)
     for rate, settled in ((0.4, None), (0.2, 0.0)):

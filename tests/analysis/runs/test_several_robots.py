@@ -61,10 +61,10 @@ def test_a_directory_holds_files_of_each_robot(convoy, tmp_path):
     assert "tdoa estimator" not in world
 
 
-def test_each_robot_has_its_own_colour_and_label(convoy):
+def test_each_robot_has_its_own_color_and_label(convoy):
     bodies = make_scene(convoy).bodies
-    colours = [bodies[name].colour for name in convoy.robots]
-    assert len(set(colours)) == len(colours) == 2
+    colors = [bodies[name].color for name in convoy.robots]
+    assert len(set(colors)) == len(colors) == 2
     (axes,) = plot_trajectory(convoy).axes
     _, labels = axes.get_legend_handles_labels()
     for name, own in convoy.robots.items():

@@ -16,7 +16,7 @@ from analysis.stability.requirements import (
     Requirements,
     allowed_stiffness,
     check_law,
-    metres_to_go,
+    meters_to_go,
 )
 from diagrams.scenario.participants import LawGains
 from diagrams.scenario.scenario import Scenario
@@ -59,8 +59,8 @@ def test_result_does_not_depend_on_the_gains_it_starts_from():
     assert search_gains(scenario, REQUIREMENTS) == LawGains()
 
 
-def test_metres_to_go_are_4_less_the_follow_distance_and_rho_0():
-    assert metres_to_go(SCENARIO, REQUIREMENTS) == pytest.approx(2.0)
+def test_meters_to_go_are_4_less_the_follow_distance_and_rho_0():
+    assert meters_to_go(SCENARIO, REQUIREMENTS) == pytest.approx(2.0)
 
 
 def test_K_0_holds_the_barrier_in_closed_form():

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.report.criterion import Criterion
 from analysis.stability.choice import chosen_laws
-from analysis.stability.law_analysis import Part, analyse_law
+from analysis.stability.law_analysis import Part, analyze_law
 from analysis.stability.linear_parts import OPERATING_POINTS
 from analysis.stability.margin_parts import MARGINS
 from analysis.stability.report_files import (
@@ -54,7 +54,7 @@ SPREAD = Part(
 
 def test_parts_run_in_order_and_see_what_was_found():
     titles: list[str] = []
-    analysis = analyse_law(
+    analysis = analyze_law(
         load_scenario(), [MASS, REFUSED, TWICE, BUILT], step=titles.append
     )
     assert titles == ["Mass", "Refused", "Twice", "Built"]
@@ -66,7 +66,7 @@ def test_parts_run_in_order_and_see_what_was_found():
 
 def test_nothing_stands_without_the_first_part():
     with pytest.raises(ValueError, match="law: cannot"):
-        analyse_law(load_scenario(), [REFUSED, MASS])
+        analyze_law(load_scenario(), [REFUSED, MASS])
 
 
 def test_laws_are_chosen_once_each():
@@ -85,7 +85,7 @@ def test_laws_are_chosen_once_each():
 
 
 def test_document_of_one_law_has_its_parts_at_the_top():
-    analysis = analyse_law(load_scenario(), [MASS, REFUSED, SPREAD])
+    analysis = analyze_law(load_scenario(), [MASS, REFUSED, SPREAD])
     document = stability_document([analysis])
     assert document["law"] == "active"
     assert document["mass"] == 3.94
@@ -107,7 +107,7 @@ def test_document_of_one_law_has_its_parts_at_the_top():
 def test_page_of_several_laws():
     parts = [MASS, REFUSED]
     analyses = [
-        analyse_law(each, parts)
+        analyze_law(each, parts)
         for each in chosen_laws(load_scenario(), ["conventional", "active"])
     ]
     page = stability_page(analyses)
@@ -126,7 +126,7 @@ def test_a_section_is_added_as_docs_extending_says():
     names: dict[str, Any] = {}
     exec(compile(page_file("extending.md", "nichols.py"), "nichols.py", "exec"), names)
     parts = [OPERATING_POINTS, MARGINS, names["NICHOLS"]]
-    analysis = analyse_law(load_scenario("obstacle_free", ["law=none"]), parts)
+    analysis = analyze_law(load_scenario("obstacle_free", ["law=none"]), parts)
     document = stability_document([analysis])
     loops = document["margins"]["implemented_loop"]["margins"]
     assert document["nichols"]["L at the sensor, along"] == pytest.approx(

@@ -7,7 +7,7 @@ import pytest
 from analysis.report.render import formula_svg
 from analysis.stability.model_sheet import model_sheet
 from diagrams import load_scenario
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 
 def test_parameters_are_the_scenarios() -> None:

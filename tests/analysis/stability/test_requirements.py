@@ -12,7 +12,7 @@ from analysis.stability.requirements import (
     LawDesign,
     Requirements,
     check_law,
-    metres_to_go,
+    meters_to_go,
     with_gains,
 )
 from diagrams.scenario.scenario import Scenario
@@ -75,9 +75,9 @@ def test_json_has_no_infinite_ratio():
     }  # fmt: skip
 
 
-def test_metres_to_go_are_what_reach_and_follow_distance_leave():
+def test_meters_to_go_are_what_reach_and_follow_distance_leave():
     asked = Requirements(source_range_m=5.0)
     wide = with_gains(SCENARIO, "conventional", reach_m=1.0)
-    assert metres_to_go(wide, asked) == pytest.approx(5.0 - 1.2 - 1.0)
+    assert meters_to_go(wide, asked) == pytest.approx(5.0 - 1.2 - 1.0)
     with pytest.raises(ValueError, match="lower it"):
-        metres_to_go(SCENARIO, Requirements(source_range_m=2.0))
+        meters_to_go(SCENARIO, Requirements(source_range_m=2.0))

@@ -6,7 +6,7 @@ import pytest
 
 from analysis.loops.ideal_scenarios import ideal_scenario, require_ideal
 from analysis.stability.choice import chosen_laws, chosen_robot
-from analysis.stability.law_analysis import analyse_law
+from analysis.stability.law_analysis import analyze_law
 from analysis.stability.report_files import (
     stability_document,
     stability_page,
@@ -23,7 +23,7 @@ def analyses():
     laws = ["trajectory_adaptive", "trajectory_filtered"]
     scenarios = chosen_laws(scenario, laws)
     work = parts_for(scenarios)
-    return [analyse_law(each, work) for each in scenarios]
+    return [analyze_law(each, work) for each in scenarios]
 
 
 def test_every_part_is_there_or_says_why_not(analyses):

@@ -100,15 +100,15 @@ def test_each_block_shows_its_name_and_all_its_ports(follower, picture):
     assert shown == {}
 
 
-def test_each_wire_is_drawn_in_the_colour_of_its_block(follower, picture):
-    colours: dict[str, set[str]] = {}
+def test_each_wire_is_drawn_in_the_color_of_its_block(follower, picture):
+    colors: dict[str, set[str]] = {}
     groups = _groups(picture, "wire")
     assert len(groups) == len(wires(follower.diagram))
     for group in groups:
         source = group.find(f"{SVG}title").text.split(".")[0]
-        colours.setdefault(source, set()).add(group.find(f"{SVG}path").get("stroke"))
-    assert all(len(found) == 1 for found in colours.values())
-    assert len(set.union(*colours.values())) == len(colours)
+        colors.setdefault(source, set()).add(group.find(f"{SVG}path").get("stroke"))
+    assert all(len(found) == 1 for found in colors.values())
+    assert len(set.union(*colors.values())) == len(colors)
 
 
 def test_each_wire_ends_on_the_edges_of_its_blocks(follower, picture):

@@ -14,7 +14,7 @@ import soundfile
 from matplotlib.colors import to_rgb
 from PIL import Image, ImageSequence
 
-from analysis.report.palette import COLOURS, ROBOT_COLOURS
+from analysis.report.palette import COLORS, ROBOT_COLORS
 from analysis.run_error import RunError
 from analysis.views.film import RunFrames, circles
 from analysis.views.movie_file import MovieFile
@@ -135,9 +135,9 @@ def test_a_full_disk_is_told(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def _coloured(picture: np.ndarray, role: str) -> np.ndarray:
-    """Mean column and row of the pixels in one colour."""
-    wanted = 255.0 * np.array(to_rgb(COLOURS[role]))
+def _colored(picture: np.ndarray, role: str) -> np.ndarray:
+    """Mean column and row of the pixels in one color."""
+    wanted = 255.0 * np.array(to_rgb(COLORS[role]))
     rows, columns = np.nonzero(np.abs(picture - wanted).max(axis=2) < 12.0)
     assert len(rows) > 10, role
     return np.array([columns.mean(), rows.mean()])
@@ -148,9 +148,9 @@ def test_the_pictures_show_the_run(collision_run):
     frames = RunFrames(collision_run)
     early, late = frames.frame(0.2), frames.frame(collision_run.simulated_s)
     assert early.shape == late.shape
-    assert _coloured(late, "robot")[0] > _coloured(early, "robot")[0] + 20.0
-    _coloured(late, "hit")
-    red = np.abs(early - 255.0 * np.array(to_rgb(COLOURS["hit"]))).max(axis=2) < 12.0
+    assert _colored(late, "robot")[0] > _colored(early, "robot")[0] + 20.0
+    _colored(late, "hit")
+    red = np.abs(early - 255.0 * np.array(to_rgb(COLORS["hit"]))).max(axis=2) < 12.0
     assert not red.any()
 
 
@@ -164,8 +164,8 @@ def test_a_film_shows_the_target_and_the_goal_of_a_route():
     result = simulate(load_scenario("robots_2", ["duration_s=1"]))
     late = RunFrames(result).frame(1.0)
     assert late.shape[2] == 3
-    for colour in ROBOT_COLOURS[:2]:
-        wanted = 255.0 * np.array(to_rgb(colour))
+    for color in ROBOT_COLORS[:2]:
+        wanted = 255.0 * np.array(to_rgb(color))
         assert (np.abs(late - wanted).max(axis=2) < 12.0).sum() > 10
 
 

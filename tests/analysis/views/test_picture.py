@@ -10,7 +10,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon, Rectangle, Wedge
 
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from analysis.runs.contact import contact_point
 from analysis.runs.known_space import known_space
 from analysis.views.bursts import sound_bursts
@@ -45,8 +45,8 @@ def test_footprints_are_the_robot_at_their_time(crossing_run):
         corners = _corners(patch)
         sides = np.linalg.norm(np.diff(corners, axis=0), axis=1)
         assert sorted(sides[:2]) == pytest.approx([0.35, 0.82])
-        centre = (columns["p_WB_x"][tick], columns["p_WB_y"][tick])
-        assert corners.mean(axis=0) == pytest.approx(centre)
+        center = (columns["p_WB_x"][tick], columns["p_WB_y"][tick])
+        assert corners.mean(axis=0) == pytest.approx(center)
 
 
 def test_footprints_are_the_first_and_the_last(crossing_run):
@@ -128,8 +128,8 @@ def test_cones_open_30_degrees_up_to_the_range_read(crossing_run):
         assert cone.theta2 - cone.theta1 == pytest.approx(30.0)
         sensor = 3 * index // len(cones)
         ticks = np.flatnonzero(read[:, sensor] == cone.r)
-        colour = "echo" if echo[ticks[0], sensor] else "empty"
-        assert cone.get_facecolor()[:3] == pytest.approx(to_rgb(COLOURS[colour]))
+        color = "echo" if echo[ticks[0], sensor] else "empty"
+        assert cone.get_facecolor()[:3] == pytest.approx(to_rgb(COLORS[color]))
     kinds = {cone.get_facecolor()[:3] for cone in cones}
     assert len(kinds) == 2
 
@@ -164,12 +164,12 @@ def test_what_was_hit_is_drawn_where_it_was_and_the_star_does_not_hide_it(
     figure = plot_trajectory(collision_run)
     (hit,) = _patches(figure, Polygon, "hit")
     assert _corners(hit).mean(axis=0) == pytest.approx([1.0, 0.1])
-    assert hit.get_facecolor()[:3] == pytest.approx(to_rgb(COLOURS["hit"]))
+    assert hit.get_facecolor()[:3] == pytest.approx(to_rgb(COLORS["hit"]))
     star = _line(figure.axes[0], "where they touched")
     assert star.get_markerfacecolor() == "none"
 
 
-def test_a_room_has_its_walls_and_an_interferer_its_colour(ideal_run):
+def test_a_room_has_its_walls_and_an_interferer_its_color(ideal_run):
     overrides = [
         "obstacle_sensing=ideal",
         "room={size_m: [8.0, 9.0, 3.0], corner_m: [-1.5, -2.5]}",
@@ -186,9 +186,9 @@ def test_a_room_has_its_walls_and_an_interferer_its_colour(ideal_run):
     assert y_low < -2.5
     assert y_high > 6.5
     radio = _line(axes, "radio (not followed)")
-    assert radio.get_color() == COLOURS["interferer"]
+    assert radio.get_color() == COLORS["interferer"]
     assert radio.get_xydata()[0] == pytest.approx([3.0, 3.0])
-    assert _line(axes, "path of leader").get_color() == COLOURS["source"]
+    assert _line(axes, "path of leader").get_color() == COLORS["source"]
 
 
 def test_a_run_without_collision_has_no_contact(ideal_run):
@@ -213,13 +213,13 @@ def test_the_map_is_to_scale_and_the_legend_hides_nothing(crossing_run):
     )
     legend = figure.legends[0].get_window_extent()
     assert legend.y0 >= 0.0
-    labelled = axes.get_tightbbox()
-    assert labelled is not None
-    assert legend.y1 <= labelled.y0
+    labeled = axes.get_tightbbox()
+    assert labeled is not None
+    assert legend.y1 <= labeled.y0
     assert legend.x1 <= figure.bbox.x1
 
 
-def test_bearings_are_in_degrees_and_ranges_in_metres(crossing_run):
+def test_bearings_are_in_degrees_and_ranges_in_meters(crossing_run):
     columns = crossing_run.columns
     ranges, bearings = plot_time_series(crossing_run).axes[:2]
     assert np.array_equal(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.report.palette import COLOURS
+from analysis.report.palette import COLORS
 from analysis.views.overlays import overlays
 from analysis.views.scene import Cone, Thing, Touched, compose, make_scene
 from diagrams import load_scenario, simulate
@@ -64,15 +64,15 @@ def test_what_was_hit_is_seen_from_the_collision_on(collision_run):
     assert hit.visible(len(collision_run.time) - 1)
 
 
-def test_bodies_of_several_robots_have_names_and_colours():
+def test_bodies_of_several_robots_have_names_and_colors():
     overrides = [
         "duration_s=0.5",
         "sources={leader: {}, radio: {body: false, waypoints_m: [[3, 3]]}}",
     ]
     scene = make_scene(simulate(load_scenario("two_followers", overrides)))
     robots = [body for body in scene.bodies.values() if "robots/" in body.path]
-    assert len({body.colour for body in robots}) == len(robots) == 2
+    assert len({body.color for body in robots}) == len(robots) == 2
     assert [layer.label for layer in scene.layers][:2] == [b.name for b in robots]
     radio = scene.bodies["radio"]
-    assert (radio.path, radio.colour) == ("sources/radio", COLOURS["interferer"])
+    assert (radio.path, radio.color) == ("sources/radio", COLORS["interferer"])
     assert not radio.moves

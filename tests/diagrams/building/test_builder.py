@@ -21,7 +21,7 @@ from diagrams.building.builder import SoundFollower
 from diagrams.building.robot import block_seed, connect_by_name
 from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant, WheelCommand, WheelOdometry
-from systems.laws.catalogue import FORCE_LAWS
+from systems.laws.catalog import FORCE_LAWS
 
 pytestmark = pytest.mark.drake
 

@@ -126,12 +126,12 @@ def test_twist_drives_a_circle(constants, law, radius, omega):
     plant, simulator = settled(f"{constants}:{law}")
     (x, y, theta), velocity = motion(plant, simulator)
     turn = math.copysign(radius, omega)
-    centre = np.array([x - turn * math.sin(theta), y + turn * math.cos(theta)])
+    center = np.array([x - turn * math.sin(theta), y + turn * math.cos(theta)])
     assert velocity[2] == pytest.approx(omega, abs=1e-6)
     for time in (7.0, 8.0, 9.0):
         simulator.AdvanceTo(time)
         pose, _ = motion(plant, simulator)
-        assert np.linalg.norm(pose[:2] - centre) == pytest.approx(radius, abs=1e-6)
+        assert np.linalg.norm(pose[:2] - center) == pytest.approx(radius, abs=1e-6)
         assert pose[2] - theta == pytest.approx(omega * (time - 6.0), abs=1e-6)
 
 

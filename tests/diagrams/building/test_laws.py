@@ -12,7 +12,7 @@ from diagrams import build_sound_follower, load_scenario
 from diagrams.building.laws import make_controller
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS, LAWS
+from systems.laws.catalog import FORCE_LAWS, LAWS
 
 OWN_LAWS = """
 from systems import ConventionalImpedanceController

@@ -1,6 +1,6 @@
 """Both engines make the same run with every noise, fault and rate of every block.
 
-Robots that meet amplify what differs: a last bit becomes a tenth of a millimetre.
+Robots that meet amplify what differs: a last bit becomes a tenth of a millimeter.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from diagrams.building.robot import publishes_state
 from diagrams.running.simulation import make_simulator
 from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import WORLD
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 EXACT = ("integration_step_s=0.002",)
 HEARING = "hearing=ideal", "duration_s=3"

@@ -95,7 +95,7 @@ def test_flying_by_is_not_reaching():
 
 
 def test_turning_on_the_spot_is_no_rest():
-    """The centre stands still at first, but P, ahead of it, sweeps round."""
+    """The center stands still at first, but P, ahead of it, sweeps round."""
     beside = {"waypoints_m": [[0.175, 1.3]]}
     pull = {"stiffness_n_m": 8.4, "damping_n_s_m": 8.4}
     result = run(source=beside, attraction=pull, duration_s=20.0)
@@ -294,7 +294,7 @@ def test_a_finer_integration_is_judged_no_more_often():
 
 
 def test_turning_into_a_box_at_rest_is_the_robots_fault():
-    """The bar's left end sweeps back onto a box behind it, and the centre leaves."""
+    """The bar's left end sweeps back onto a box behind it, and the center leaves."""
     box = {"name": "box", "waypoints_m": [[-0.3, 0.3]], "size_m": [0.1, 0.1]}
     result = run(source={"waypoints_m": [[0.6, 2.4]]}, obstacles=[box], duration_s=20.0)
     assert result.collision is not None

@@ -22,7 +22,7 @@ from studies.nonlinear.velocity_terms import velocity_term_analysis
 
 
 def curves(axes):
-    """Data of the labelled lines, by label."""
+    """Data of the labeled lines, by label."""
     return {
         line.get_label(): line.get_xydata()
         for line in axes.get_lines()
@@ -43,9 +43,9 @@ def test_velocity_terms(two_boxes):
 
 def test_contact_oscillation(two_boxes):
     found = contact_oscillation(two_boxes("conventional"), duration_s=6.0)
-    _, growth, centre = plot_contact_oscillation(found).axes
+    _, growth, center = plot_contact_oscillation(found).axes
     predicted = found.predictions["printed"]
-    np.testing.assert_allclose(curves(centre)["printed"][:, 1], predicted.centres_m)
+    np.testing.assert_allclose(curves(center)["printed"][:, 1], predicted.centers_m)
     np.testing.assert_allclose(curves(growth)["printed"][:, 1], predicted.growth_per_s)
 
 

@@ -9,7 +9,7 @@ from studies.proofs.plots import plot_disturbance_bounds
 
 
 def curves(axes):
-    """Data of the labelled lines, by label."""
+    """Data of the labeled lines, by label."""
     return {
         line.get_label(): line.get_xydata()
         for line in axes.get_lines()

@@ -69,7 +69,7 @@ def test_pure_turn_stays_in_place():
 
 
 def test_unequal_wheels_drive_a_circle():
-    """The ratio of the rims fixes the centre, whatever the motors' lag."""
+    """The ratio of the rims fixes the center, whatever the motors' lag."""
     result = drive(DiffDrivePlant(), (3.0, 6.0), 4.0)
     radius = 0.41 / 2 * (6 + 3) / (6 - 3)
     theta = 0.06 * (6 - 3) / 0.41 * lagged(4.0)

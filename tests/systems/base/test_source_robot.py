@@ -56,7 +56,7 @@ def test_heading_of_a_source_at_rest(bench):
 
 
 def test_converted_block_moves_alike_and_carries_no_gradient(bench):
-    """The source is exogenous: time is no variable of the linearisation."""
+    """The source is exogenous: time is no variable of the linearization."""
     converted = bench(SourceRobot(source=STRAIGHT).ToAutoDiffXd())
     converted.context.SetTime(AutoDiffXd(6.0, 1, 0))
     pose = converted.output("pose_WS")

@@ -1,4 +1,4 @@
-"""Slip by friction against closed forms, optimisation and a stiff integration."""
+"""Slip by friction against closed forms, optimization and a stiff integration."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def test_agrees_with_a_stiff_integration_of_coulomb_s_law(friction):
 
 
 def test_forces_are_the_allowed_ones_that_come_nearest_to_no_slip():
-    """Gauss' principle, solved by a general optimiser."""
+    """Gauss' principle, solved by a general optimizer."""
     rng = np.random.default_rng(0)
     weights = np.array([1.0, 1.0, GYRATION])
     for _ in range(20):

@@ -113,7 +113,7 @@ def swinging(
 def test_without_rounding_six_minutes_of_swinging_are_known_to_a_tenth_of_a_mm(
     hz, tick_s
 ):
-    """Forward speed in phase with the yaw acceleration: a millimetre in an hour."""
+    """Forward speed in phase with the yaw acceleration: a millimeter in an hour."""
     commands = swinging(round(360.0 / tick_s), hz, 0.0, 1.0, 1.0, tick_s)
     true = driven(commands, tick_s)
     poses = by_odometry(commands, true.angles, EXACT, tick_s)
@@ -198,8 +198,8 @@ def test_quadrature_follows_any_lag_and_any_tick(tick_s, lag):
     expected = quad(eastward, 0.0, tick_s, **exactly)[0]
     steady = rate * tick_s, turn_rate * tick_s
     behind = -lag * math.expm1(-tick_s / lag)
-    travelled = steady[0] + lagged_way * behind, steady[1] + lagged_turn * behind
-    x, _, _ = advance_pose((0.0, 0.0, 0.4), travelled, steady, motion)
+    traveled = steady[0] + lagged_way * behind, steady[1] + lagged_turn * behind
+    x, _, _ = advance_pose((0.0, 0.0, 0.4), traveled, steady, motion)
     assert x == pytest.approx(expected, abs=2e-9)
 
 

@@ -24,14 +24,14 @@ def plan(shape):
     return DelayPlan(shape, 340.0, FS, N, 300.0, 15_000.0)
 
 
-def noises(shape, colour, frames):
+def noises(shape, color, frames):
     """Frames of independent noise in the channels."""
     generator = Generator(Philox(key=8))
     for _ in range(frames):
         rows = generator.standard_normal((shape.count, N))
-        if colour == "brown":
+        if color == "brown":
             rows = signal.lfilter([1.0], [1.0, -0.97], rows)
-        if colour == "band":
+        if color == "band":
             rows = signal.sosfilt(BAND, rows)
         yield rows.astype(np.float32)
 
@@ -39,17 +39,17 @@ def noises(shape, colour, frames):
 BAND = signal.butter(4, [1_000, 4_000], "bandpass", fs=FS, output="sos")
 
 
-@pytest.mark.parametrize("colour", ["white", "brown", "band"])
+@pytest.mark.parametrize("color", ["white", "brown", "band"])
 @pytest.mark.parametrize("shape", [ROW, SQUARE, RING], ids=["3", "4", "8"])
-def test_chances_of_noise_are_uniform_or_safer(shape, colour):
+def test_chances_of_noise_are_uniform_or_safer(shape, color):
     """No more of them below p than a share p, by a binomial test at 0.1 %.
 
     Edges that meet in a microphone share its noise: with eight microphones and
-    coloured noise a set rate of 10 % is exceeded by a quarter, one of 3 % is met.
+    colored noise a set rate of 10 % is exceeded by a quarter, one of 3 % is met.
     """
     its_plan = plan(shape)
     chances = []
-    for rows in noises(shape, colour, 600):
+    for rows in noises(shape, color, 600):
         seen = look(rows, its_plan)
         assert seen is not None
         chances.append(seen[0].chance)
@@ -129,7 +129,7 @@ def test_what_is_no_peak_is_ambiguous(values):
 
 @pytest.mark.parametrize("shape", [ROW, SQUARE, RING], ids=["3", "4", "8"])
 def test_arrivals_of_whole_samples(shape):
-    """Neighbouring channels are joined to a tree that reaches all."""
+    """Neighboring channels are joined to a tree that reaches all."""
     source = Generator(Philox(key=3)).standard_normal(N + 400)
     source = signal.sosfilt(BAND, source)
     ranges = np.linalg.norm(np.array([1.5, 0.9]) - shape.p_AM, axis=1)

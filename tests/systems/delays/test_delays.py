@@ -199,7 +199,7 @@ def test_errors_of_channels_with_unequal_noise_are_their_own():
     mean = np.mean(stated, axis=0)
     scatter = np.sqrt(np.mean(np.square(errors), axis=0))
     np.testing.assert_allclose(np.sqrt(np.diag(mean)), scatter, rtol=0.25)
-    # All pairs joined, each channel's part is the mean over its two neighbours.
+    # All pairs joined, each channel's part is the mean over its two neighbors.
     share = mean[0, 1] / (mean[1, 1] - mean[0, 1])
     assert share == pytest.approx((levels[0] / levels[2]) ** 2, rel=0.3)
 

@@ -29,7 +29,7 @@ def test_seed_and_tick_decide(tick):
     assert not np.isin(first, tick_generator(8, tick).standard_normal(8)).any()
 
 
-def test_neighbouring_seeds_and_ticks_are_independent():
+def test_neighboring_seeds_and_ticks_are_independent():
     """400 streams of 400 numbers: correlations scatter as chance has it."""
     rows = np.array(
         [

@@ -10,10 +10,10 @@ from pydantic.json_schema import models_json_schema
 
 from diagrams.scenario import participants
 from diagrams.scenario.run_parameters import RunParameters
-from systems.laws.catalogue import LAWS
+from systems.laws.catalog import LAWS
 
 #: What the unit at the end of a field's name allows, longest ending first. A robot on
-#: a floor stays within a kilometre, a run within a day; nothing that divides is 0.
+#: a floor stays within a kilometer, a run within a day; nothing that divides is 0.
 KINDS = {
     "_sound_speed_m_s": (50.0, 1e4),
     "_position_m": (-1e3, 1e3),

@@ -32,8 +32,8 @@ coordinate = st.floats(-5.0, 5.0)
 
 def heard_ahead(source, pose, rng=None, *, ranged: bool = True):
     """What a row of microphones across the robot at ``pose`` makes of a source."""
-    centre, ahead = np.array(pose[:2]), np.array([math.cos(pose[2]), math.sin(pose[2])])
-    d = np.array(source) - centre
+    center, ahead = np.array(pose[:2]), np.array([math.cos(pose[2]), math.sin(pose[2])])
+    d = np.array(source) - center
     if rng is not None:
         d = d + rng.normal(0.0, NOISE, 2)
     if ahead @ d < 0.0:
@@ -44,8 +44,8 @@ def heard_ahead(source, pose, rng=None, *, ranged: bool = True):
         d = d / math.hypot(*d)
         R = variance * np.array([[d[1] ** 2, -d[0] * d[1]], [0.0, d[0] ** 2]])
     else:
-        d, R = d + centre, variance * np.eye(2)
-    return np.array([*d, R[0, 0], R[0, 1], R[1, 1], *centre, *ahead, float(ranged)])
+        d, R = d + center, variance * np.eye(2)
+    return np.array([*d, R[0, 0], R[0, 1], R[1, 1], *center, *ahead, float(ranged)])
 
 
 def listen(frames: Iterable[Any], memory=None, **kwargs):

@@ -366,7 +366,7 @@ def test_clipping_costs_little(name, limit):
 @pytest.mark.parametrize(
     ("pair", "taken_for_places"), [((0, 1), 0), ((0, 3), 0), ((1, 2), 1), ((2, 3), 0)]
 )
-def test_exchanged_neighbours_of_four_give_no_wrong_place(pair, taken_for_places):
+def test_exchanged_neighbors_of_four_give_no_wrong_place(pair, taken_for_places):
     """Opposite ones mirror the array, which nothing tells."""
     localiser = listener(SQUARE)
     errors = []
@@ -386,7 +386,7 @@ def test_exchanged_neighbours_of_four_give_no_wrong_place(pair, taken_for_places
 
 
 @pytest.mark.parametrize("pair", [(0, 3), (1, 2)])
-def test_delays_that_do_not_fit_together_betray_exchanged_neighbours(pair):
+def test_delays_that_do_not_fit_together_betray_exchanged_neighbors(pair):
     """Without that check the frames of the test above give bearings that are off."""
     localiser = Localiser(TDOAParameters(), SQUARE, C, limited=False)
     wrong = 0

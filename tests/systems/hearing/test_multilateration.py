@@ -200,9 +200,9 @@ def test_the_three_in_a_row_closed_form_is_the_least_squares_solution():
     fix = locate_source(tau, covariance, row, C)
     wide = np.diag([0.0, 0.0, 1.0])
     wide[:2, :2] = covariance
-    centre = four.p_AM[1]
+    center = four.p_AM[1]
     other = locate_source(np.array([*tau, 0.0]), wide, four, C)
-    assert other.p_AS - centre == pytest.approx(fix.p_AS, abs=1e-6)
+    assert other.p_AS - center == pytest.approx(fix.p_AS, abs=1e-6)
     # Its covariance is that of the same place, seen from the same axes.
     np.testing.assert_allclose(other.covariance, fix.covariance, rtol=1e-3, atol=1e-9)
 

@@ -56,7 +56,7 @@ def test_channels_in_another_order():
     assert fix.range == pytest.approx(distance)
 
 
-def test_two_metres_broadside_in_numbers():
+def test_two_meters_broadside_in_numbers():
     """R1 = sqrt(4.16): a = 2 - R1, b = 0."""
     a = 2.0 - math.sqrt(4.16)
     bearing, distance, status = source_from_delays(a / C, 0.0, L, C)
@@ -115,7 +115,7 @@ def test_covariance_is_first_order(bearing, distance):
     assert fix.range_std == pytest.approx(math.sqrt(expected[3, 3]), rel=1e-3)
 
 
-def test_range_error_of_one_sample_at_four_metres():
+def test_range_error_of_one_sample_at_four_meters():
     """b - 2a ~ l^2 / R, so that dR = R^2 / l^2 d(b - 2a): 34 cm a sample."""
     fix = locate_in_row(np.array(delays(0.0, 4.0)), np.diag([1e-10, 0.0]), ROW, C)
     # A pure error of tau_12 enters b - 2a twice.

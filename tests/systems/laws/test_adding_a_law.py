@@ -32,7 +32,7 @@ from analysis.loops.push_and_pull import DESIGNED_LAWS
 from analysis.loops.radial_law import radial_law
 from studies.linear.root_locus import root_loci
 from analysis.stability.choice import chosen_laws
-from analysis.stability.law_analysis import analyse_law
+from analysis.stability.law_analysis import analyze_law
 from analysis.stability.model_sheet import model_sheet
 from analysis.stability.report_files import stability_page
 from diagrams import build_sound_follower, load_scenario
@@ -65,7 +65,7 @@ print(json.dumps({
     "force": radial_law(scenario).force(0.4, 0.5),
     "equations": [each.text for each in sheet.law_equations],
     "parameters": [row.field for row in sheet.parameters if row.of_law],
-    "heading": stability_page([analyse_law(scenario, [])]),
+    "heading": stability_page([analyze_law(scenario, [])]),
     "all": [each.only.law for each in chosen_laws(scenario, ["all"])],
     "loci": [locus.parameter for locus in root_loci(scenario)],
     "lines": {line.get_label(): line.get_color() for line in lines},
@@ -93,7 +93,7 @@ def add_law(tree: Path) -> None:
     )
     code = page_file("your_law.md", "gaussian.py")
     (laws / "gaussian.py").write_text(code, "utf-8")
-    listed = (laws / "catalogue.py").read_text("utf-8")
+    listed = (laws / "catalog.py").read_text("utf-8")
     for before, added in (
         (
             "from systems.laws.guarded import GUARDED\n",
@@ -103,7 +103,7 @@ def add_law(tree: Path) -> None:
     ):
         assert listed.count(before) == 1
         listed = listed.replace(before, added.format(before))
-    (laws / "catalogue.py").write_text(listed, "utf-8")
+    (laws / "catalog.py").write_text(listed, "utf-8")
     (tree / "questions.py").write_text(QUESTIONS, "utf-8")
 
 
@@ -158,7 +158,7 @@ def test_root_loci_vary_its_gains(answers):
     ]
 
 
-def test_pictures_draw_it_in_a_colour_of_its_own(answers):
+def test_pictures_draw_it_in_a_color_of_its_own(answers):
     assert answers["lines"].pop("bell curve") == "#009E73"
     assert answers["lines"] == {
         "conventional": "#D55E00",

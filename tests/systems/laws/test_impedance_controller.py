@@ -204,7 +204,7 @@ def test_acceleration_is_the_sum_over_the_mass(bench):
     )
 
 
-def test_a_law_of_the_catalogue_and_its_name_are_one_block(bench):
+def test_a_law_of_the_catalog_and_its_name_are_one_block(bench):
     named, general = ActiveImpedanceController(), ImpedanceController(law=ACTIVE)
     pushes = []
     for block in (named, general):

@@ -84,7 +84,7 @@ def test_the_same_seed_gives_the_same_bytes():
     assert first.tobytes() != other.tobytes()
 
 
-def test_the_strength_is_what_a_sensor_reads_two_metres_downwind():
+def test_the_strength_is_what_a_sensor_reads_two_meters_downwind():
     own = OdorParameters(kind="steady", ratio_at_2_m=0.6)
     plume = np.array(OdorPlume(parameters=own, wind=WIND).step.state)
     assert (1.0 + concentration(plume, 2.0, 0.0)) ** -0.7155 == pytest.approx(0.6)

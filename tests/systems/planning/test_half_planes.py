@@ -1,4 +1,4 @@
-"""The velocity nearest to a wanted one: against SciPy's optimiser."""
+"""The velocity nearest to a wanted one: against SciPy's optimizer."""
 
 from __future__ import annotations
 

@@ -191,7 +191,7 @@ def test_with_the_motors_lag_a_wall_is_approached_and_not_passed():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_lag_and_turns_among_boxes_cost_millimetres(seed):
+def test_lag_and_turns_among_boxes_cost_millimeters(seed):
     """And wheels are never told more than they can, though the wish swings about."""
     draw = np.random.default_rng(seed)
     angles = [math.tau * k / 5 for k in range(5)]

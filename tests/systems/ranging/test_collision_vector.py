@@ -118,7 +118,7 @@ def test_echoes_apart_are_two_obstacles(r, joined):
     assert vector[0] == (4.0 if joined else 1.0)
 
 
-def test_paper_joins_the_nearest_echo_with_its_nearer_neighbour():
+def test_paper_joins_the_nearest_echo_with_its_nearer_neighbor():
     (vector,) = collision_vectors(at_ranges(0.7, 0.5, 0.6), PAPER)
     assert vector[0] == 5.0
     (vector,) = collision_vectors(at_ranges(0.6, 0.5, 0.7), PAPER)
@@ -126,7 +126,7 @@ def test_paper_joins_the_nearest_echo_with_its_nearer_neighbour():
 
 
 def test_paper_keeps_the_outer_sensors_apart():
-    """Echoes 1 and 3 alone are no neighbours: a gap, not a wall."""
+    """Echoes 1 and 3 alone are no neighbors: a gap, not a wall."""
     (vector,) = collision_vectors(at_ranges(0.5, None, 0.4), PAPER)
     assert vector[0] == 3.0
     assert math.hypot(*vector[1:]) == pytest.approx(0.4)

@@ -127,7 +127,7 @@ def test_a_box_before_a_wall_is_an_object_of_its_own():
     assert np.all(found[1:, X] == pytest.approx(1.5, abs=1e-2))
 
 
-def test_rows_of_hits_are_cut_where_neighbours_are_far_apart():
+def test_rows_of_hits_are_cut_where_neighbors_are_far_apart():
     """Three beams ahead; the threshold is gap + stretch 2 r sin(apart/2)."""
     beams = Driven().block.step.numbers.beams
     axes = np.radians([30.0, 0.0, -30.0])

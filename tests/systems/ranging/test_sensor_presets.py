@@ -68,7 +68,7 @@ def test_a_ring_has_no_gaps_and_stands_over_the_axle(name):
     ring = sensors(name)
     np.testing.assert_allclose(ring.half_angles, math.pi / ring.count)
     assert set(ring.places) == {MAST}
-    assert len(ring.neighbours) == ring.count
+    assert len(ring.neighbors) == ring.count
 
 
 def test_three_of_six_look_back_from_the_rear_edge():

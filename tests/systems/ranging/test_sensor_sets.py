@@ -40,7 +40,7 @@ def test_a_ring_of_even_number_has_one_ahead():
 
 
 @pytest.mark.parametrize(
-    ("listed", "neighbours"),
+    ("listed", "neighbors"),
     [
         (along(30.0, 0.0, -30.0), {(0, 1), (1, 2)}),
         (along(*SIX.axes_deg), {(0, 1), (1, 2), (3, 4), (4, 5)}),
@@ -49,8 +49,8 @@ def test_a_ring_of_even_number_has_one_ahead():
         (along(0.0), set()),
     ],
 )
-def test_neighbours_are_next_to_one_another_and_not_far(listed, neighbours):
-    assert set(sensors(sensors=listed).neighbours) == neighbours
+def test_neighbors_are_next_to_one_another_and_not_far(listed, neighbors):
+    assert set(sensors(sensors=listed).neighbors) == neighbors
 
 
 def test_a_thin_ring_measures_a_round_of_walls():
@@ -73,14 +73,14 @@ def test_a_thin_ring_measures_a_round_of_walls():
 
 
 def test_echoes_to_both_sides_of_the_back_are_joined():
-    """Of twelve, the first (180 deg) and the last (-150 deg) are neighbours."""
+    """Of twelve, the first (180 deg) and the last (-150 deg) are neighbors."""
     ring = sensors(sensors=12)
     ranges, echo = np.full(12, 3.0), np.zeros(12)
     ranges[[0, 11]], echo[[0, 11]] = 0.5, 1.0
     points = echo_points(ranges, echo, ring)
     parameters = CollisionVectorParameters()
-    ((feature, x, y),) = collision_vectors(points, parameters, ring.neighbours)
-    assert feature == 24.0, "12 + the twelfth sensor and its right neighbour"
+    ((feature, x, y),) = collision_vectors(points, parameters, ring.neighbors)
+    assert feature == 24.0, "12 + the twelfth sensor and its right neighbor"
     middle = math.radians(-165.0)
     distance = 0.5 * math.cos(math.radians(15.0))
     assert (x, y) == pytest.approx(
@@ -91,7 +91,7 @@ def test_echoes_to_both_sides_of_the_back_are_joined():
 def test_of_many_vectors_the_nearest_three_are_kept():
     points = [(float(5 - k), 0.0) for k in range(5)]
     found = collision_vectors(
-        points, CollisionVectorParameters(aggregation="sum"), neighbours=()
+        points, CollisionVectorParameters(aggregation="sum"), neighbors=()
     )
     assert found == [(5.0, 1.0, 0.0), (4.0, 2.0, 0.0), (3.0, 3.0, 0.0)]
 

@@ -1,4 +1,4 @@
-"""A* against SciPy's Dijkstra on the same neighbours."""
+"""A* against SciPy's Dijkstra on the same neighbors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from systems.routes.grid_search import search_cells
 
 
 def cost_by_dijkstra(blocked, start, goal):
-    """The graph whole, of all pairs of neighbours."""
+    """The graph whole, of all pairs of neighbors."""
     n, m = blocked.shape
     number = np.arange(n * m).reshape(n, m)
     free = np.pad(~blocked, 1)

@@ -167,7 +167,7 @@ def nearest_on_the_way(
 
 
 def test_what_can_be_braked_is_what_a_finer_simulation_brakes():
-    """Cells at random; decisions that hang on half a millimetre are left out."""
+    """Cells at random; decisions that hang on half a millimeter are left out."""
     draw, judged = np.random.default_rng(4), {True: 0, False: 0}
     for _ in range(120):
         speeds, commanded = draw.uniform(-12, 12, (2, 2))
@@ -193,7 +193,7 @@ def test_what_can_be_braked_is_what_a_finer_simulation_brakes():
         # Above the margin: as far as to it.
         (0.05, 0.045, True),
         (0.05, 0.055, False),
-        # In between: by half a millimetre, and not below the least.
+        # In between: by half a millimeter, and not below the least.
         (-0.001, 0.0004, True),
         (-0.001, 0.0008, False),
         (-0.0028, 0.0001, True),
@@ -269,7 +269,7 @@ def test_turning_in_place_always_passes():
         for speeds in ((0.0, 0.0), (-10.0, 10.0)):
             args = (0.0, 0.0, 0.0), speeds, (-12.0, 12.0), at_hand, NUMBERS
             assert can_be_braked(*args)
-    # With a millimetre a second ahead or more it is no turn in place.
+    # With a millimeter a second ahead or more it is no turn in place.
     args = (0.0, 0.0, 0.0), (0.0, 0.0), (-12.0, 12.1), wall_at(0.452), NUMBERS
     assert not can_be_braked(*args)
 
@@ -331,7 +331,7 @@ def test_between_two_looks_the_axle_comes_nearer_by_less_than_the_bound(tick_s, 
 
 @pytest.mark.parametrize("lag", [0.05, 1.0])
 def test_at_rest_no_way_is_left(lag):
-    """What is cut off after the last look is a fifth of a millimetre, at any lag."""
+    """What is cut off after the last look is a fifth of a millimeter, at any lag."""
     numbers = NUMBERS._replace(motor_lag_s=lag, part=lagged_motion(TICK_S, lag))
     way = 0.1 * (TICK_S + 2.0 * lag)
     for ahead in np.arange(0.0, way, 5e-4):

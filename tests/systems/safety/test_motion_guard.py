@@ -71,7 +71,7 @@ def known_space(radius: float = 3.0) -> Any:
 def guarded(
     bench: Any, space: Any, acceleration: Any, fault: float = 0.0, **fields: Any
 ) -> Any:
-    """The guard's state after a tick: v_P, wheels, report, modelled wheels."""
+    """The guard's state after a tick: v_P, wheels, report, modeled wheels."""
     from pydrake.common.value import Value
 
     guard = MotionGuard(parameters=GuardParameters(**fields))

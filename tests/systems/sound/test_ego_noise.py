@@ -1,4 +1,4 @@
-"""Ego noise: level, colour, coherence and seam of a recording that repeats."""
+"""Ego noise: level, color, coherence and seam of a recording that repeats."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_level_is_below_the_source_at_one_metre(tmp_path):
     assert rms == pytest.approx(0.1, rel=0.02)
 
 
-def test_colour_is_that_of_the_recording(tmp_path):
+def test_color_is_that_of_the_recording(tmp_path):
     noise = played(ego_noise(recording(tmp_path / "fan.wav", seconds=3.0)), 100)
     frequencies, density = scipy.signal.welch(noise[0], 100_000, nperseg=8192)
     band = (frequencies > 250.0) & (frequencies < 700.0)

@@ -196,7 +196,7 @@ def test_robot_that_drives_shifts_the_tone():
         np.angle(audio.counts[1, part] @ np.exp(-2j * np.pi * shifted * t[part]))
         for part in (slice(0, 1250), slice(1250, 2500))
     ]
-    # Beat of the two halves' centres, 12.5 ms apart.
+    # Beat of the two halves' centers, 12.5 ms apart.
     assert abs(halves[1] - halves[0]) / (2 * np.pi * 0.0125) < 0.1
 
 

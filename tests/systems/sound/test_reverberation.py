@@ -194,7 +194,7 @@ def test_moving_places_follow_their_updates():
 
 
 def test_new_places_fade_in_without_a_click():
-    """Nowhere do neighbouring samples differ by more than a 1 kHz tone's can."""
+    """Nowhere do neighboring samples differ by more than a 1 kHz tone's can."""
     wave = 0.1 * np.sin(2 * np.pi * 1_000.0 * np.arange(120_000) / FS)
     room = Reverberation(ROOM, C)
     here = places([-0.8, -0.3, 0.4], [1.6, 0.9])

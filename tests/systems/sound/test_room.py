@@ -28,7 +28,7 @@ def within(rows, low_hz, high_hz):
 
 
 def simulated(room, source, microphones, c):
-    """The same by pyroomacoustics, from where its interpolation filter is centred."""
+    """The same by pyroomacoustics, from where its interpolation filter is centered."""
     absorption, _, order = room.walls(c)
     box = pra.ShoeBox(
         room.size_m, fs=FS, materials=pra.Material(absorption), max_order=order

@@ -177,7 +177,7 @@ def heard_1_7_m_away(emitter, calling_from_s=None):
     return np.concatenate(frames, axis=1)
 
 
-def test_a_call_is_heard_once_it_has_travelled_and_as_exactly_as_a_clock():
+def test_a_call_is_heard_once_it_has_traveled_and_as_exactly_as_a_clock():
     """1.7 m take 5 ms; the second tick of 25 ms begins the call at 0.1 s."""
     sound = SoundParameters(on_s=0.05, period_s=0.1)
     late = sound.model_copy(update={"start_s": 0.1})

@@ -234,7 +234,7 @@ def test_clearance_against_sampled_edges(a, b):
 def test_overlap_is_undone_by_its_depth(a, heading, length, width, u, v):
     """The shortest push along an edge's normal, found by trying all of them.
 
-    The second centre lies inside the first rectangle, so that they overlap.
+    The second center lies inside the first rectangle, so that they overlap.
     """
     c, s = math.cos(a[2]), math.sin(a[2])
     x, y = a[0] + c * u * a[3] - s * v * a[4], a[1] + s * u * a[3] + c * v * a[4]

@@ -92,7 +92,7 @@ def test_blocks_do_not_matter():
 
 
 def test_an_array_with_wide_pairs_votes_by_the_steered_response():
-    """Half a wavelength fits between neighbours only up to 430 Hz."""
+    """Half a wavelength fits between neighbors only up to 430 Hz."""
     samples = waves(ROW, talkers(1), [(35.0, 0.0)])
     votes = votes_of(ROW, samples)
     assert votes.steered.all()

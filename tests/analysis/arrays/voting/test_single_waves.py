@@ -1,4 +1,4 @@
-"""Plane waves of known directions, above where neighbours' phases wrap as well."""
+"""Plane waves of known directions, above where neighbors' phases wrap as well."""
 
 from __future__ import annotations
 

@@ -25,8 +25,8 @@ def votes_at(single_deg, steered_deg):
     )
 
 
-def around(centre, count, rng):
-    return centre + 3.0 * rng.standard_normal(count)
+def around(center, count, rng):
+    return center + 3.0 * rng.standard_normal(count)
 
 
 def test_where_both_kinds_of_votes_agree_is_a_source():
@@ -48,9 +48,9 @@ def test_where_no_single_bin_votes_is_no_source():
 def test_any_votes_can_be_gathered():
     rng = np.random.default_rng(2)
     for _ in range(300):
-        centres = rng.uniform(-180.0, 180.0, 3)
-        single = rng.choice(centres, 30) + rng.normal(0.0, 12.0, 30)
-        steered = rng.choice(centres, 12) + rng.normal(0.0, 12.0, 12)
+        centers = rng.uniform(-180.0, 180.0, 3)
+        single = rng.choice(centers, 30) + rng.normal(0.0, 12.0, 30)
+        steered = rng.choice(centers, 12) + rng.normal(0.0, 12.0, 12)
         for source in gather_sources(votes_at(single, steered)):
             assert math.isfinite(source.bearing_std)
             assert 0.0 <= source.confidence <= 1.0

@@ -103,7 +103,7 @@ def test_a_block_distance_within_the_body_is_told():
             [f"{ADAPTIVE}.rate=1e5"],
             ["rate: is 100000", "1.6e+03"],
         ),
-        # The lag at which K = 3 pulls through K_e S = 1.5 is half a metre.
+        # The lag at which K = 3 pulls through K_e S = 1.5 is half a meter.
         (
             "adaptive",
             [
@@ -128,7 +128,7 @@ def test_what_is_bounded_or_slow_needs_none(cure):
 
 
 def test_the_box_is_held_against_what_its_least_damping_stands():
-    """By the plant as Drake linearises it, D = 3: limits need no warning."""
+    """By the plant as Drake linearizes it, D = 3: limits need no warning."""
     bound = largest_contact_stiffness(
         load_scenario("unknown_block"), damping_n_s_m=DAMPING_BOX_N_S_M[0]
     )

@@ -43,9 +43,9 @@ def matrices(track):
     return track[1:5].copy(), P
 
 
-def sighting(z, R, *, centre=(0.0, 0.0), ahead=(1.0, 0.0), ranged=True):
+def sighting(z, R, *, center=(0.0, 0.0), ahead=(1.0, 0.0), ranged=True):
     R = np.asarray(R)
-    return np.array([*z, R[0, 0], R[0, 1], R[1, 1], *centre, *ahead, float(ranged)])
+    return np.array([*z, R[0, 0], R[0, 1], R[1, 1], *center, *ahead, float(ranged)])
 
 
 def bearing(direction: float, std: float, **kwargs):
@@ -125,7 +125,7 @@ def simulated_source(rng, ticks: int):
 def test_errors_and_innovations_are_what_the_covariances_say():
     """200 sources of the model, heard for 0.5 s in every 2 s over 8 s.
 
-    The sums of the normalised squares are chi-square: means of the position's
+    The sums of the normalized squares are chi-square: means of the position's
     error within their 95 % intervals at the ends of all gaps and bursts, and of
     all innovations. What the gate cuts off the tail (1 % of the innovations,
     beyond 9.21, of which nearly all count less or nothing) is less than their
@@ -167,7 +167,7 @@ def test_without_noise_the_track_is_at_the_sighting(x, y, dx, two):
     zero = np.zeros((2, 2))
     for k in range(6):
         z = [x + k * dx * 0.02, y - k * dx * 0.01]
-        fold(memory, sighting(z, zero, centre=(-9.0, 0.0)), SETTINGS)
+        fold(memory, sighting(z, zero, center=(-9.0, 0.0)), SETTINGS)
         np.testing.assert_allclose(chosen_track(memory)[1:3], z, rtol=0, atol=1e-13)
         memory += T * ages(len(memory) // HYPOTHESIS)
 
@@ -182,7 +182,7 @@ def test_a_bearing_counts_across_itself_alone(direction, off):
     fold(memory, sighting(at + 2.0 * u + off * n, 0.01 * np.eye(2)), SETTINGS)
     memory += 0.5 * ages(len(memory) // HYPOTHESIS)
     before, P = matrices(expected(memory))
-    fold(memory, bearing(direction, 0.02, centre=at), SETTINGS)
+    fold(memory, bearing(direction, 0.02, center=at), SETTINGS)
     after, covariance = matrices(chosen_track(memory))
     h = np.array([*n, 0.0, 0.0])
     variance = (0.02 * 2.0) ** 2
@@ -198,7 +198,7 @@ def test_a_bearing_counts_across_itself_alone(direction, off):
 def test_first_bearing_takes_the_assumed_range():
     """0.02 rad at 3 m is 6 cm across; along it, half the range is one deviation."""
     memory = blank_memory(1)
-    fold(memory, bearing(0.0, 0.02, centre=(1.0, 1.0)), SETTINGS)
+    fold(memory, bearing(0.0, 0.02, center=(1.0, 1.0)), SETTINGS)
     x, P = matrices(chosen_track(memory))
     np.testing.assert_allclose(x, [4.0, 1.0, 0.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(np.sqrt(np.diag(P)), [1.5, 0.06, 0.35, 0.35])
@@ -208,7 +208,7 @@ def test_bearings_from_two_places_find_the_range():
     """Triangulation, 2 m from a path of 1.5 m, in which a source hardly moves."""
     memory = blank_memory(1)
     for y in np.linspace(0.0, 1.5, 61):
-        fold(memory, bearing(math.atan2(-y, 2.0), 0.01, centre=(0.0, y)), SETTINGS)
+        fold(memory, bearing(math.atan2(-y, 2.0), 0.01, center=(0.0, y)), SETTINGS)
         memory += 1e-3 * ages(len(memory) // HYPOTHESIS)
     x, P = matrices(chosen_track(memory))
     assert np.all(np.abs(x[:2] - [2.0, 0.0]) < 3.0 * np.sqrt(np.diag(P)[:2]))
@@ -238,7 +238,7 @@ def test_an_outlier_changes_nothing(distance, direction, hypotheses):
     before = chosen_track(memory).copy()
     z = [2.0 + distance * math.cos(direction), distance * math.sin(direction)]
     # Far behind the row, so that its image is an outlier, too.
-    far = sighting(z, 1e-6 * np.eye(2), centre=(-30.0, 0.0))
+    far = sighting(z, 1e-6 * np.eye(2), center=(-30.0, 0.0))
     assert not fold(memory, far, SETTINGS)
     np.testing.assert_array_equal(chosen_track(memory), before)
 
@@ -299,7 +299,7 @@ def test_scatter_is_learnt_where_it_exceeds_what_is_stated(true_std, stated_std)
     """A resting source: 5 s of frames that err by more than they say, or not.
 
     The factor finds 16 / 1.5, what is beyond the margin; honest frames leave it
-    at 1. Either way the normalised error stays in proportion.
+    at 1. Either way the normalized error stays in proportion.
     """
     rng = np.random.default_rng(6)
     factors, errors = [], []

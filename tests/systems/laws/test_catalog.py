@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from systems.laws.catalogue import LAWS, law_title
+from systems.laws.catalog import LAWS, law_title
 
 TUNED: dict[str, tuple[Any, Any]] = {
     law.name: (law, law.tuning) for law in LAWS.values() if law.tuning is not None

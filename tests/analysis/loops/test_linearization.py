@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.loops import linearisation
+from analysis.loops import linearization
 from analysis.loops.equilibria import follow_equilibrium
 from analysis.loops.ideal_loop import ideal_loop
-from analysis.loops.linearisation import (
+from analysis.loops.linearization import (
     blockwise_model,
     check_gradient,
     compare_routes,
@@ -74,7 +74,7 @@ def test_routes_that_differ_are_told_by_how_much(monkeypatch):
     D = true.D.copy()
     D[2, 1] -= 40.0
     off = replace(true, A=1.01 * true.A, D=D)
-    monkeypatch.setattr(linearisation, "blockwise_model", lambda _: off)
+    monkeypatch.setattr(linearization, "blockwise_model", lambda _: off)
     found = compare_routes(point)
     assert found.matrix_difference == pytest.approx(40.0)
     moved = [min(abs(1.01 * true.poles - pole)) for pole in found.simple_poles]
@@ -138,7 +138,7 @@ def test_sampled_poles_approach_the_continuous_ones(law):
             assert np.abs(continuous - pole).min() < 0.025 * abs(pole) ** 2 + 0.001
 
 
-def test_a_linearisation_takes_less_than_a_tenth_of_a_second():
+def test_a_linearization_takes_less_than_a_tenth_of_a_second():
     """The build and its twin are there already."""
     (point, _) = points("active")
     loop = ideal_loop(point.loop.scenario)

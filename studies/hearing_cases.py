@@ -1,0 +1,50 @@
+"""Counts right and wrong answers of locate and listen in cases of public reports.
+
+Each module of ``studies.support.hearing_cases`` holds the cases of one kind: ``TITLE``,
+and ``cases()``, which lists them.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+from studies.support.hearing_cases.case import HearingCase
+from studies.tables import Table
+
+_KINDS = Path(__file__).parent / "support" / "hearing_cases"
+
+
+def kinds() -> dict[str, tuple[str, list[HearingCase]]]:
+    """Returns title and cases of each kind, by the name of its module."""
+    found = {}
+    for file in sorted(_KINDS.glob("*.py")):
+        if file.stem not in ("__init__", "case"):
+            module = import_module(f"studies.support.hearing_cases.{file.stem}")
+            found[file.stem] = (module.TITLE, module.cases())
+    return found
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Adds the options of this study."""
+    parser.add_argument("--kind", help="only the kinds whose names contain this text")
+    parser.add_argument("--case", help="only the cases whose names contain this text")
+
+
+def run(options: argparse.Namespace) -> Iterator[Table]:
+    """Yields the counts of all kinds, and then each case that was wrong."""
+    rows, wrong = [], []
+    for name, (title, cases) in kinds().items():
+        if options.kind and options.kind not in name:
+            continue
+        chosen = [c for c in cases if not options.case or options.case in c.name]
+        outcomes = [(case, case.judge()) for case in chosen]
+        right = sum(outcome.right for _, outcome in outcomes)
+        claims = sum(outcome.false_claim for _, outcome in outcomes)
+        rows.append([title, len(outcomes), right, claims])
+        wrong += [[title, c.name, o.said] for c, o in outcomes if not o.right]
+    total = ["all", *(sum(row[k] for row in rows) for k in (1, 2, 3))]
+    yield Table("Cases", ("kind", "cases", "right", "false claims"), [*rows, total])
+    yield Table("Wrong answers", ("kind", "case", "said"), wrong)

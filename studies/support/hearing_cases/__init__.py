@@ -1,0 +1,1 @@
+"""Cases of hearing for ``studies.hearing_cases``: each module holds one kind."""
