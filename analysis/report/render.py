@@ -189,7 +189,8 @@ def figure_svg(figure: Drawing, name: str, label: str) -> Markup:
             format="svg",
             metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
         )
-    return _embed(stream.getvalue(), name, label)
+    width, height = figure.get_size_inches()
+    return _embed(stream.getvalue(), name, label, tall=bool(height > width))
 
 
 def formula_svg(tex: str, name: str, label: str) -> Markup:
@@ -205,8 +206,10 @@ def formula_svg(tex: str, name: str, label: str) -> Markup:
     return _embed(stream.getvalue().decode(), name, label)
 
 
-def _embed(svg: str, name: str, label: str) -> Markup:
+def _embed(svg: str, name: str, label: str, *, tall: bool = False) -> Markup:
     """Turns the text of an SVG file into an element of an HTML page.
+
+    On paper, a tall drawing may fill the page.
 
     Identifiers must be unique on the page. If another part of the SVG refers to an
     identifier, the function puts the drawing's name in front of the identifier. The
@@ -224,4 +227,6 @@ def _embed(svg: str, name: str, label: str) -> Markup:
     svg = re.sub(r'(href=")#', rf"\1#{name}-", svg)
     svg = svg.replace("url(#", f"url(#{name}-")
     label = escaping.escape(label.replace("`", ""))
-    return Markup(svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1))
+    kind = ' class="tall"' if tall else ""
+    start = f'<svg{kind} role="img" aria-label="{label}" '
+    return Markup(svg.replace("<svg ", start, 1))
