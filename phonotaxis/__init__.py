@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from diagrams.scenario.scenario import Scenario
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
     from phonotaxis.listening import ListenResult, listen
+    from phonotaxis.listings import Listing, laws, scenarios
     from phonotaxis.loops import DesignResult, StabilityResult, design, stability
     from phonotaxis.recordings import (
         CalibrationResult,
@@ -41,6 +42,7 @@ __all__ = [
     "DesignResult",
     "InputError",
     "ListenResult",
+    "Listing",
     "LocateResult",
     "Result",
     "RunError",
@@ -56,11 +58,13 @@ __all__ = [
     "columns",
     "compare",
     "design",
+    "laws",
     "library_scenarios",
     "listen",
     "load_scenario",
     "locate",
     "main",
+    "scenarios",
     "simulate",
     "stability",
     "sweep",
@@ -77,6 +81,7 @@ _HOMES = {
     "DesignResult": "phonotaxis.loops",
     "InputError": "systems.framework.input_error",
     "ListenResult": "phonotaxis.listening",
+    "Listing": "phonotaxis.listings",
     "LocateResult": "phonotaxis.recordings",
     "Result": "phonotaxis.result",
     "RunError": "analysis.run_error",
@@ -91,10 +96,12 @@ _HOMES = {
     "columns": "analysis.runs.columns",
     "compare": "phonotaxis.batches",
     "design": "phonotaxis.loops",
+    "laws": "phonotaxis.listings",
     "library_scenarios": "diagrams.scenario.loading",
     "listen": "phonotaxis.listening",
     "load_scenario": "diagrams.scenario.loading",
     "locate": "phonotaxis.recordings",
+    "scenarios": "phonotaxis.listings",
     "simulate": "phonotaxis.runs",
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",

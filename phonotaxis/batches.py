@@ -208,9 +208,10 @@ def compare(
         *scenarios: Names of scenarios in the library, YAML files of layouts, or YAML
             files of scenarios. If none are given, the four experiments of the papers
             are run.
-        laws: Names of the laws, as a list or as one text with commas. None means the
-            laws of the papers and driving without avoidance. For a scenario with
-            routes, None means the laws for routes.
+        laws: Names of the laws, as a list or as one text with commas. ``all`` means
+            every law for robots of this kind. None means the laws of the papers and
+            driving without avoidance. For a scenario with routes, None means the laws
+            for routes.
         runs: Number of layouts per scenario. Every law meets each layout.
         seed: Seed of the layouts and the noise.
         settings: Values of other fields of the scenarios, by dotted path.
@@ -230,11 +231,10 @@ def compare(
             remedy.
         RunError: Every run failed.
     """
-    chosen = laws.split(",") if isinstance(laws, str) else laws
     plans = {
         Path(each).stem: comparison_plan(
             str(each),
-            laws=chosen,
+            laws=laws,
             runs=runs,
             seed=seed,
             settings=dict(settings or {}),

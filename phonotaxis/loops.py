@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,12 +22,15 @@ from analysis.stability.report_files import (
     write_stability,
 )
 from diagrams.building.laws import make_controller
-from diagrams.scenario.loading import load_scenario
+from diagrams.scenario.loading import changed_scenario
 from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.scenario_files import check_files
+from diagrams.scenario.suggestions import law_names
 from phonotaxis.result import Prepared, Result, ignore
+from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
+    import control
     from matplotlib.figure import Figure
 
 __all__ = ["DesignResult", "StabilityResult", "design", "stability"]
@@ -59,6 +62,35 @@ class StabilityResult(Result):
         """Which robots are left out, and the notes of the analyses."""
         notes = [note for each in self.analyses for note in each.notes]
         return tuple(dict.fromkeys(filter(None, [self.robots_left_out, *notes])))
+
+    def state_space(self, model: str = "", law: str = "") -> control.StateSpace:
+        """Returns a linear model of the report as a system of ``control``.
+
+        Args:
+            model: Name of the model, or a part of the name that no other model has.
+                Empty means the first model: the loop in continuous time.
+            law: Name of the law. Empty means the first law of the report.
+
+        Returns:
+            The model with named inputs, outputs and states. All values are deviations
+            from the operating point, in SI units.
+
+        Raises:
+            InputError: There is no such law or no such model. The message lists the
+                names.
+        """
+        analyses = {each.law: each for each in self.analyses}
+        chosen = analyses.get(law or self.analyses[0].law)
+        if chosen is None:
+            raise InputError(
+                "law", f"{law!r} is not analyzed; use {', '.join(analyses)}"
+            )
+        exact = [each for each in chosen.models if each.name == model]
+        found = exact or [each for each in chosen.models if model in each.name]
+        if not found or (model and len(found) > 1):
+            names = ", ".join(repr(each.name) for each in chosen.models) or "none"
+            raise InputError("model", f"{model!r} is not a model; there are: {names}")
+        return found[0].to_control()
 
     def failure(self, out: Path | None) -> RunError | None:
         """Returns an error that names the parts with a fault of the program."""
@@ -124,7 +156,9 @@ def stability(
     laws: str | Iterable[str] = (),
     robot: str | None = None,
     full: bool = False,
+    settings: Iterable[str] | Mapping[str, Any] = (),
     progress: Callable[[str], None] | None = None,
+    **fields: Any,
 ) -> StabilityResult:
     """Analyzes the stability of a scenario's control loop.
 
@@ -141,6 +175,9 @@ def stability(
         full: Whether to check by longer simulations, and by more of them.
         progress: Function that is called with the name of each part before its
             computation.
+        settings: Fields of the scenario to change, as for ``load_scenario``.
+        **fields: Further fields of the scenario to change. They override ``settings``.
+            ``law`` has the meaning of ``laws``.
 
     Returns:
         Data of every part, and the verdicts on the stability.
@@ -149,11 +186,10 @@ def stability(
         InputError: The law or the robot does not exist, or the robot has no linear
             model.
     """
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
-    names = laws.split(",") if isinstance(laws, str) else list(laws)
+    laws = [*law_names(laws), *law_names(fields.pop("law", ()))]
+    scenario = changed_scenario(scenario, settings, fields)
     alone, note = chosen_robot(scenario, robot)
-    prepared = prepare_stability(chosen_laws(alone, names), note, full=full)
+    prepared = prepare_stability(chosen_laws(alone, laws), note, full=full)
     return prepared.run(progress or ignore)
 
 
@@ -186,8 +222,10 @@ def prepare_stability(
 
 def design(
     scenario: Scenario | str | Path = "default",
+    settings: Iterable[str] | Mapping[str, Any] = (),
     *,
     progress: Callable[[float], None] | None = None,
+    **fields: Any,
 ) -> DesignResult:
     """Derives gains of the laws from stated requirements.
 
@@ -197,7 +235,9 @@ def design(
     Args:
         scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
             path of a YAML file.
+        settings: Fields of the scenario to change, as for ``load_scenario``.
         progress: Function that is called with the number of finished test runs.
+        **fields: Further fields of the scenario to change. They override ``settings``.
 
     Returns:
         Gains and figures of both attractions.
@@ -206,8 +246,7 @@ def design(
         InputError: The scenario is not valid or has several robots, or no gains meet a
             requirement that must be met.
     """
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
+    scenario = changed_scenario(scenario, settings, fields)
     return prepare_design(scenario).run(progress or ignore)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import diagrams
 from diagrams.running.audio.run_audio import RunAudio
-from diagrams.scenario.loading import load_scenario
+from diagrams.scenario.loading import changed_scenario
 from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.scenario_files import check_files
@@ -73,6 +73,12 @@ class RunResult(diagrams.RunResult, Result):
     def notes(self) -> tuple[str, ...]:
         """Assumptions that the scenario breaks, each in one line."""
         return tuple(str(each) for each in self.warnings)
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """Metrics of the run by name; ``phonotaxis columns --metrics`` lists them."""
+        metrics: dict[str, Any] = self.document()["metrics"]
+        return metrics
 
     def plot(self, what: Literal["trajectory", "time_series"] = "trajectory") -> Figure:
         """Draws the run.
@@ -202,14 +208,18 @@ class RunResult(diagrams.RunResult, Result):
 
 def simulate(
     scenario: Scenario | str | Path = "default",
+    settings: Iterable[str] | Mapping[str, Any] = (),
     *,
     engine: Engine | None = None,
     progress: Callable[[float], None] | None = None,
     audio: RunAudio | None = None,
     save_audio: str | Path | None = None,
     movie: str | Path | None = None,
+    **fields: Any,
 ) -> RunResult:
     """Runs a scenario to its end.
+
+    Example: ``simulate("default", law="active", duration_s=20)``.
 
     A warning of the logger ``phonotaxis`` states each assumption that the scenario
     breaks. ``notes`` of the result contains the same texts.
@@ -217,6 +227,7 @@ def simulate(
     Args:
         scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
             path of a YAML file.
+        settings: Fields of the scenario to change, as for ``load_scenario``.
         engine: ``drake`` or ``compiled``. The compiled engine runs the same blocks in
             one compiled loop. Its first run compiles the loop, and later runs are
             faster than with Drake. None means the engine of the scenario.
@@ -228,6 +239,7 @@ def simulate(
             loudspeakers play. None means that no sound is saved.
         movie: New .gif or .mp4 file for a movie of the run from above. None means no
             movie.
+        **fields: Further fields of the scenario to change. They override ``settings``.
 
     Returns:
         Result of the run.
@@ -237,8 +249,7 @@ def simulate(
             the remedy.
         RunError: The encoder of the movie failed.
     """
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
+    scenario = changed_scenario(scenario, settings, fields)
     prepared = prepare_simulation(
         scenario,
         engine=engine,

@@ -14,8 +14,9 @@ from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.loading import load_scenario, read_mapping
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from diagrams.scenario.settings import parse_setting
+from diagrams.scenario.suggestions import law_names
 from systems.framework.input_error import InputError
-from systems.laws.catalog import FORCE_LAWS, ROUTE_LAWS
+from systems.laws.catalog import FORCE_LAWS, LAWS, ROUTE_LAWS
 
 #: Names of the scenarios of the papers' experiments.
 EXPERIMENTS = (
@@ -38,7 +39,7 @@ def library_layouts() -> dict[str, Path]:
 def comparison_plan(
     scenario: str,
     *,
-    laws: Iterable[str] | None = None,
+    laws: str | Iterable[str] | None = None,
     runs: int = 50,
     seed: int = 1,
     settings: dict[str, Any] | None = None,
@@ -57,21 +58,28 @@ def comparison_plan(
 
     Each run uses one law for all robots. By default, the laws are those of the papers
     and driving without avoidance; for a scenario with routes, they are the laws for
-    routes.
+    routes. ``all`` means every law for robots of this kind.
     """
     plan = _layouts(scenario)
     base = scenario_from_mapping(plan.base)
     _require_one_law(base, plan.base)
+    routed = any(robot.kind == "router" for robot in base.robots.values())
     if laws is None:
-        routed = any(robot.kind == "router" for robot in base.robots.values())
         laws = ROUTE_LAWS if routed else FORCE_LAWS
+    kind = "router" if routed else "follower"
+    every = [name for name, law in LAWS.items() if law.robot == kind and name != "none"]
+    names = law_names(laws)
+    names = [law for name in names for law in (every if name == "all" else [name])]
     for key, values in (grid or {}).items():
         if isinstance(values, str):  # it would be read letter by letter
             raise InputError(f"grid.{key}", f"is {values!r}; give a list of values")
     fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
     fields |= {
         "set": plan.set | (settings or {}),
-        "grid": {"law": tuple(laws), **{k: tuple(v) for k, v in (grid or {}).items()}},
+        "grid": {
+            "law": tuple(dict.fromkeys(names)),
+            **{k: tuple(v) for k, v in (grid or {}).items()},
+        },
         "runs": runs,
         "seed": seed,
         "pair": True,
@@ -103,7 +111,7 @@ def _require_one_law(base: Scenario, written: Mapping[str, Any]) -> None:
 def comparison_plans(
     scenarios: Sequence[str] = (),
     *,
-    laws: str | None = None,
+    laws: Iterable[str] | None = None,
     velocity_terms: str | None = None,
     runs: int = 50,
     seed: str | None = None,
@@ -133,7 +141,7 @@ def comparison_plans(
             raise InputError("scenario", f"{name} is listed twice; remove one")
         plans[name] = comparison_plan(
             scenario,
-            laws=None if laws is None else laws.split(","),
+            laws=laws,
             runs=runs,
             seed=_whole_seed(seed),
             settings=fields,

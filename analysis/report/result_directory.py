@@ -13,7 +13,9 @@ from pathlib import Path
 from systems.framework.input_error import InputError, shortened
 
 #: Parent directory of the numbered result directories.
-_BASE = "results"
+RESULTS = "results"
+#: Link in this directory to the last result directory.
+LATEST = "latest"
 
 
 class ResultDirectory:
@@ -72,7 +74,7 @@ def take_directory(out: str | Path | None) -> ResultDirectory:
     if out is not None:
         path = check_directory(out)
         return ResultDirectory(path, _make(path))
-    return ResultDirectory(*_make_number(check_directory(_BASE, parent=True)))
+    return ResultDirectory(*_make_number(check_directory(RESULTS, parent=True)))
 
 
 @contextmanager
@@ -86,7 +88,7 @@ def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
     """
     taken = take_directory(out)
     path, partial = taken.path, None
-    shown = Path(_BASE) / path.name if out is None else Path(out).expanduser()
+    shown = Path(RESULTS) / path.name if out is None else Path(out).expanduser()
     try:
         try:
             partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
@@ -95,12 +97,35 @@ def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
         yield shown, partial
         partial.chmod(0o777 & ~_umask())
         partial.rename(path)
+        point_latest(path)
     except BaseException:
         if partial is not None:
             shutil.rmtree(partial, ignore_errors=True)
         taken.undo()
         raise
     taken.close()
+
+
+def point_latest(path: Path) -> None:
+    """Makes ``results/latest`` a link to a numbered result directory.
+
+    Other result directories have no such link. Nor have file systems without links.
+    """
+    if path.parent != Path(RESULTS).resolve() or not path.name.isdecimal():
+        return
+    new = path.parent / f".{LATEST}.{path.name}"
+    with suppress(OSError):
+        # A link that moves into place is never missing while another process reads it.
+        new.symlink_to(path.name)
+        new.replace(path.parent / LATEST)
+    with suppress(OSError):
+        new.unlink(missing_ok=True)
+
+
+def numbered_results() -> list[Path]:
+    """Lists the numbered result directories under ``results`` in order."""
+    found = [path for path in Path(RESULTS).glob("[0-9]*") if path.name.isdecimal()]
+    return sorted((path for path in found if path.is_dir()), key=lambda p: int(p.name))
 
 
 def check_directory(out: str | Path, *, parent: bool = False) -> Path:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagrams.scenario.fields.shipped import SCHEMA_FILE
+from diagrams.scenario.fields.shipped import SCHEMA_FILE, known_laws
 from diagrams.scenario.suggestions import did_you_mean
 from diagrams.scenario.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from diagrams.scenario.scenario import Scenario
 
 _LIBRARY = Path(__file__).parents[1] / "scenarios"
+#: File with the effective scenario in a result directory.
+SCENARIO_FILE = "scenario.yaml"
 
 
 def library_scenarios() -> dict[str, Path]:
@@ -24,19 +26,23 @@ def library_scenarios() -> dict[str, Path]:
 
 
 def load_scenario(
-    source: str | Path = "default",
+    source: str | Path | Mapping[str, Any] = "default",
     overrides: Iterable[str] | Mapping[str, Any] = (),
+    **fields: Any,
 ) -> Scenario:
     """Loads a scenario from the library or from a file, and changes some of its fields.
 
     Args:
-        source: A name from the library (``phonotaxis scenarios``), or the path of a
-            file.
+        source: A name from the library (``phonotaxis scenarios``), the path of a file,
+            a result
+            directory, whose scenario is loaded again, or the contents of such a file.
         overrides: Fields to change. One form is a mapping of dotted paths to values:
             ``{"source.speed_m_s": 0.2}``. The other form is a list of texts
             ``path=value``, where the value is YAML: ``["source.speed_m_s=0.2"]``. A
             path names an obstacle by its name or its index: ``obstacles.cart.size_m``
             or ``obstacles.0.size_m``.
+        **fields: Further fields to change, for example ``law="active"``. They override
+            ``overrides``.
 
     Returns:
         The validated scenario.
@@ -48,12 +54,56 @@ def load_scenario(
     """
     # Lists of commands and of scenarios need no models of the fields.
     from diagrams.scenario.scenario import scenario_from_mapping
-    from diagrams.scenario.settings import apply_settings, plain_settings
+    from diagrams.scenario.settings import all_settings, apply_settings, plain_settings
 
-    data = written_fields(source)
-    apply_settings(data, dict(plain_settings(overrides)))
+    if isinstance(source, Mapping):
+        data = {"name": "scenario", **dict(plain_settings(source))}
+    else:
+        data = written_fields(source)
+    apply_settings(data, all_settings(overrides, fields))
     resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
+
+
+def changed_scenario(
+    scenario: Scenario | str | Path,
+    settings: Iterable[str] | Mapping[str, Any] = (),
+    fields: Mapping[str, Any] | None = None,
+) -> Scenario:
+    """Returns a scenario with some fields changed.
+
+    Args:
+        scenario: The scenario, or a source for ``load_scenario``.
+        settings: Fields to change, as for ``load_scenario``.
+        fields: Further fields to change. They override ``settings``.
+
+    Raises:
+        InputError: See ``load_scenario``.
+    """
+    from diagrams.scenario.scenario import Scenario
+
+    if not isinstance(scenario, Scenario):
+        return load_scenario(scenario, settings, **(fields or {}))
+    if not settings and not fields:
+        return scenario
+    return scenario.with_(settings, **(fields or {}))
+
+
+def scenario_text(source: str | Path) -> str:
+    """Returns the YAML file of a scenario as it was written, with its comments.
+
+    Args:
+        source: A name from the library, the path of a file, or a result directory.
+
+    Returns:
+        The text of the file.
+
+    Raises:
+        InputError: The name is unknown, or the file is unreadable.
+    """
+    path = _find(source)
+    read_mapping(path)
+    return path.read_text("utf-8")
 
 
 def written_fields(source: str | Path) -> dict[str, Any]:
@@ -94,7 +144,7 @@ def write_scenario(scenario: Scenario, directory: Path) -> None:
     the directory was moved.
     """
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
-    (directory / "scenario.yaml").write_text(first + dump_scenario(scenario), "utf-8")
+    (directory / SCENARIO_FILE).write_text(first + dump_scenario(scenario), "utf-8")
     shutil.copyfile(SCHEMA_FILE, directory / SCHEMA_FILE.name)
 
 
@@ -104,16 +154,28 @@ def _find(source: str | Path) -> Path:
         return library[str(source)]
     path = Path(source)
     known = "a name that 'phonotaxis scenarios' lists"
+    if path.is_dir():
+        if (path / SCENARIO_FILE).is_file():
+            return path / SCENARIO_FILE
+        raise InputError(
+            "scenario",
+            f"the directory {source} has no {SCENARIO_FILE}; use a result directory, "
+            f"{known}, or the path of a .yaml file",
+        )
     if path.suffix in (".yaml", ".yml"):
         if path.is_file():
             return path
         raise InputError(
             "scenario", f"there is no file {source}; check the path, or use {known}"
         )
+    hint = did_you_mean(str(source), library)
+    if "=" in str(source):
+        hint = f"; to set a field, write --set {source}"
+    elif str(source) in known_laws():
+        hint = "; laws are listed with commas and without spaces, as in --law a,b"
     raise InputError(
         "scenario",
-        f"{str(source)!r} is not known; use {known}, or the path of a .yaml file"
-        f"{did_you_mean(str(source), library)}",
+        f"{str(source)!r} is not known; use {known}, or the path of a .yaml file{hint}",
     )
 
 

@@ -7,7 +7,7 @@ YAML.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from itertools import combinations
 from typing import Annotated, Any, TypeVar
@@ -48,7 +48,7 @@ from diagrams.scenario.participants import (
     SourceParameters,
 )
 from diagrams.scenario.run_parameters import RunParameters
-from diagrams.scenario.settings import apply_settings, plain_settings
+from diagrams.scenario.settings import all_settings, apply_settings
 from diagrams.scenario.shorthand import (
     SOURCE,
     as_written,
@@ -248,11 +248,17 @@ class Scenario(RunParameters):
         robot = self.only.model_copy(update=fields)
         return self.model_copy(update={"robots": {next(iter(self.robots)): robot}})
 
-    def with_(self, changes: Mapping[str, Any]) -> Scenario:
+    def with_(
+        self, changes: Iterable[str] | Mapping[str, Any] = (), **fields: Any
+    ) -> Scenario:
         """Returns a validated copy of the scenario in which some fields differ.
 
+        Example: ``scenario.with_(law="active", **{"source.speed_m_s": 0.2})``.
+
         Args:
-            changes: New plain values, by dotted path, as for ``load_scenario``.
+            changes: Fields to change, as for ``load_scenario``: a mapping of dotted
+                paths to plain values, or a list of texts ``path=value``.
+            **fields: Further fields to change. They override ``changes``.
 
         Returns:
             The new scenario.
@@ -261,7 +267,7 @@ class Scenario(RunParameters):
             InputError: A path or value is invalid, see ``load_scenario``.
         """
         data = self.model_dump(mode="json")
-        apply_settings(data, dict(plain_settings(changes)))
+        apply_settings(data, all_settings(changes, fields))
         return scenario_from_mapping(data)
 
     def require_one_robot(self, purpose: str) -> None:

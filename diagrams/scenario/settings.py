@@ -36,6 +36,21 @@ def plain_settings(
     return map(parse_setting, overrides)
 
 
+def all_settings(
+    overrides: Iterable[str] | Mapping[str, Any], fields: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Returns settings and keyword arguments together; the latter override.
+
+    Args:
+        overrides: Settings in one of the forms of ``plain_settings``.
+        fields: Values by dotted path.
+
+    Raises:
+        InputError: See ``plain_settings``.
+    """
+    return dict(plain_settings(overrides)) | dict(plain_settings(fields))
+
+
 def _plain(key: str, value: Any) -> Any:
     """Returns a copy of the value as plain data, in the form of a file."""
     try:

@@ -21,6 +21,20 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     return f" (did you mean {' or '.join(repr(by_folded[each]) for each in near)}?)"
 
 
+def law_names(laws: str | Iterable[str]) -> list[str]:
+    """Returns the names of laws that a user has given.
+
+    Args:
+        laws: One text with commas, or several texts, which may have commas, too.
+
+    Returns:
+        The names in order, each once.
+    """
+    texts = [laws] if isinstance(laws, str) else laws
+    names = [name.strip() for text in texts for name in text.split(",")]
+    return list(dict.fromkeys(filter(None, names)))
+
+
 def unknown_law(name: str, known: Collection[str]) -> InputError:
     """Returns the error for a control law whose name is unknown.
 

@@ -113,5 +113,5 @@ COMMAND = Command(
         "accuracy",
         "accuracy --trials 20 --tolerances",
     ),
-    was="localization",
+    synonyms=("localization",),
 )

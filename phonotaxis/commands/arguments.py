@@ -32,6 +32,24 @@ def completed_by(argument: Any, words: dict[str, str] | str) -> None:
     argument.complete = words
 
 
+def take_laws(parser: ArgumentParser, about: str) -> None:
+    """Adds the option ``--law``, with one or several laws, to ``options.law``.
+
+    Args:
+        parser: Parser of a command.
+        about: Meaning of ``all`` and of a missing option.
+    """
+    law = parser.add_argument(
+        "--law",
+        "--laws",
+        metavar="LAW,...",
+        action="append",
+        default=[],
+        help=f"laws, with commas or as several options: {LAW_HELP}; {about}",
+    )
+    completed_by(law, LAW_WORDS)
+
+
 def take_json(parser: ArgumentParser) -> None:
     """Adds the option ``--json``."""
     parser.add_argument("--json", action="store_true", help="print one JSON document")

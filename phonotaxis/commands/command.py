@@ -73,5 +73,5 @@ class Command:
     live: bool = False
     """Whether the command prints on standard output while it runs, and an interrupt is
     its usual end. Such a command must not run a user's code."""
-    was: str = ""
-    """Former name of the command, which still works."""
+    synonyms: tuple[str, ...] = ()
+    """Other words that users type for the command, which work, too."""

@@ -33,6 +33,7 @@ from phonotaxis.commands import (
 )
 from phonotaxis.commands.carry_out import carry_out
 from phonotaxis.commands.command import Command
+from phonotaxis.commands.guesses import meant_words, no_command, no_option
 from phonotaxis.commands.interrupts import Interrupts
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -48,6 +49,7 @@ COMMANDS: dict[str, Command] = {
         lists.SCENARIOS,
         lists.FIELDS,
         lists.LAWS,
+        lists.RESULTS,
         locate.COMMAND,
         listen.COMMAND,
         calibrate.COMMAND,
@@ -81,34 +83,22 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         command = re.match(r"argument COMMAND: invalid choice: '(.*?)'", message)
-        hint = ""
         if command:
-            from diagrams.scenario.suggestions import did_you_mean
+            raise _UsageError(no_command(command[1], COMMANDS))
+        raise _UsageError(f"{message}; see {self.prog} --help")
 
-            hint = did_you_mean(command[1], COMMANDS)
-        raise _UsageError(f"{message}{hint}; see {self.prog} --help")
-
-    def refuse(self, command: str, words: Sequence[str]) -> NoReturn:
+    def refuse(
+        self, command: str, unknown: Sequence[str], words: Sequence[str]
+    ) -> NoReturn:
         """Raises an error about words that a subcommand does not know.
-
-        The message suggests a similar option of the subcommand. If there is no similar
-        option, the message names the other subcommands that have the unknown option.
 
         Args:
             command: Name of the subcommand.
-            words: Unknown words of the command line, at least one.
+            unknown: Unknown words of the command line, at least one.
+            words: All words of the command line.
         """
-        hint = ""
-        if option := re.search(r"--([\w-]+)", " ".join(words)):
-            from diagrams.scenario.suggestions import did_you_mean
-
-            options = {name: _options(parser) for name, parser in self.below.items()}
-            # The names have no dashes, which would make all options look similar.
-            hint = did_you_mean(option[1], options[command]).replace("'", "'--", 1)
-            others = [name for name, own in options.items() if option[1] in own]
-            if others and not hint:
-                hint = f" (--{option[1]} is an option of {', '.join(others)})"
-        text = f"unrecognized arguments: {' '.join(words)}{hint}"
+        options = {name: _options(parser) for name, parser in self.below.items()}
+        text = no_option(command, unknown, words, options)
         raise _UsageError(f"{text}; see {self.prog} {command} --help")
 
 
@@ -147,12 +137,12 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
         _check_words(words)
         parser = make_parser()
         try:
-            options, unknown = parser.parse_known_args(_by_new_names(words))
+            options, unknown = parser.parse_known_args(_known_names(words))
         except SystemExit:  # of --help and --version
             sys.stdout.flush()
             raise
         if unknown:
-            parser.refuse(options.command, unknown)
+            parser.refuse(options.command, unknown, words)
         carry_out(COMMANDS[options.command], options, interrupts)
     except BrokenPipeError:  # the reader of our output has left
         return FAILED
@@ -171,12 +161,13 @@ def _drop_unwritable() -> None:
         sys.stdout = None
 
 
-def _by_new_names(words: Sequence[str]) -> Sequence[str]:
-    """Replaces a former name of a command with its present name."""
+def _known_names(words: Sequence[str]) -> Sequence[str]:
+    """Replaces a synonym of a command by the name of the command."""
+    words = meant_words(words)
     for command in COMMANDS.values():
-        if words and command.was and words[0] == command.was:
+        if words and words[0] in command.synonyms:
             print(
-                f"phonotaxis: the command {command.was} is now called {command.name}",
+                f"phonotaxis: {words[0]} means the command {command.name}",
                 file=sys.stderr,
             )
             return [command.name, *words[1:]]

@@ -5,7 +5,13 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import SCENARIO_WORDS, completed_by, say, take_output
+from phonotaxis.commands.arguments import (
+    SCENARIO_WORDS,
+    completed_by,
+    say,
+    take_laws,
+    take_output,
+)
 from phonotaxis.commands.command import Command, Take
 
 if TYPE_CHECKING:
@@ -21,11 +27,10 @@ def _add_arguments(parser: ArgumentParser) -> None:
         "papers' four experiments)",
     )
     completed_by(scenario, SCENARIO_WORDS)
-    parser.add_argument(
-        "--laws",
-        metavar="LAW,...",
-        help="laws to compare (default: the papers' laws and none; for routes the laws "
-        "of routes)",
+    take_laws(
+        parser,
+        "all: every law for robots of this kind (default: the papers' laws and none; "
+        "for routes the laws of routes)",
     )
     parser.add_argument(
         "--velocity-term",
@@ -66,7 +71,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[ComparisonResult]:
     check_options(options.out, workers=options.workers, resume=options.resume)
     plans = comparison_plans(
         options.scenario,
-        laws=options.laws,
+        laws=options.law or None,
         velocity_terms=options.velocity_term,
         runs=options.runs,
         seed=options.seed,

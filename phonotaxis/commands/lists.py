@@ -1,50 +1,165 @@
-"""Commands that list what there is: scenarios, laws, fields, columns, installation."""
+"""Commands that list scenarios, laws, fields, columns, results, the installation."""
 
 from __future__ import annotations
 
+import html
 import json
+import re
 import shutil
 import textwrap
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import take_json
+from phonotaxis.commands.arguments import (
+    LAW_WORDS,
+    SCENARIO_WORDS,
+    completed_by,
+    take_json,
+)
 from phonotaxis.commands.command import Command, Printed, Take
 from phonotaxis.result import Prepared
 
 if TYPE_CHECKING:
     from diagrams.scenario.fields.field_list import Field
+    from phonotaxis.listings import Listing
 
 _SIGNS = {"ok": "ok  ", "note": "note", "bad": "BAD "}
 
 
-def _scenarios(options: Namespace, take: Take) -> Prepared[Printed]:
-    from diagrams import library_scenarios
-    from diagrams.scenario.loading import read_mapping
+def _add_scenarios_arguments(parser: ArgumentParser) -> None:
+    name = parser.add_argument(
+        "name",
+        nargs="?",
+        help="print this scenario: a name, a YAML file or a result directory",
+    )
+    completed_by(name, SCENARIO_WORDS)
+    parser.add_argument(
+        "--copy",
+        metavar="FILE",
+        help="write the named scenario to a new file, to change it",
+    )
+    take_json(parser)
 
-    rows = {
-        name: read_mapping(path).get("description", "")
-        for name, path in library_scenarios().items()
-    }
-    return _listing("scenarios", "description", rows)
+
+def _scenarios(options: Namespace, take: Take) -> Prepared[Printed]:
+    from phonotaxis.listings import scenarios
+
+    if options.name is not None or options.copy is not None:
+        return _scenario(options.name, options.copy)
+    return _listing("scenarios", "description", scenarios())
+
+
+def _scenario(name: str | None, copy: str | None) -> Prepared[Printed]:
+    """Prints or copies the file of one scenario."""
+    from analysis.report.provenance import SCHEMA_VERSION
+    from diagrams.scenario.loading import scenario_text
+    from systems.framework.input_error import InputError
+
+    if name is None:
+        raise InputError(
+            "name", f"is missing; write phonotaxis scenarios default --copy {copy}"
+        )
+    # The schema lies elsewhere for a copy.
+    text = re.sub(r"^# yaml-language-server.*\n", "", scenario_text(name))
+    document = {"schema_version": SCHEMA_VERSION, "scenario": name, "text": text}
+    if copy is None:
+        return _printed(document, text.rstrip("\n"))
+    path = Path(copy)
+    if path.suffix not in (".yaml", ".yml"):
+        raise InputError("copy", f"{copy} must end in .yaml")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise InputError(
+            "copy", f"{copy} cannot be written ({error.strerror}); name a new file"
+        ) from None
+    return _printed(
+        {**document, "file": copy}, f"wrote {copy}; phonotaxis simulate {copy} runs it"
+    )
+
+
+def _add_laws_arguments(parser: ArgumentParser) -> None:
+    name = parser.add_argument("name", nargs="?", help="describe this law, with fields")
+    completed_by(name, LAW_WORDS)
+    take_json(parser)
 
 
 def _laws(options: Namespace, take: Take) -> Prepared[Printed]:
-    from diagrams.scenario.fields.shipped import known_laws
+    from phonotaxis.listings import laws
 
-    return _listing("laws", "title", known_laws())
+    if options.name is not None:
+        return _law(options.name, laws())
+    return _listing("laws", "title", laws())
 
 
-def _listing(plural: str, about: str, rows: Mapping[str, str]) -> Prepared[Printed]:
+def _law(name: str, titles: Mapping[str, str]) -> Prepared[Printed]:
+    """Prints the title of a law and the fields that only robots with this law use."""
+    from analysis.report.provenance import SCHEMA_VERSION
+    from diagrams.scenario.fields.field_list import list_fields
+    from diagrams.scenario.fields.shipped import scenario_schema
+    from diagrams.scenario.suggestions import unknown_law
+    from systems.framework.input_error import InputError
+
+    if name not in titles:
+        raise InputError("name", unknown_law(name, titles).message)
+    fields = [
+        field
+        for field in list_fields(scenario_schema())
+        if field.path.startswith(f"laws.{name}.")
+    ]
+    document = {
+        "schema_version": SCHEMA_VERSION,
+        "name": name,
+        "title": titles[name],
+        "fields": [asdict(field) for field in fields],
+    }
+    more = f"phonotaxis fields --law {name} lists all fields of a robot with this law"
+    return _printed(document, "\n".join([titles[name], *map(_paragraph, fields), more]))
+
+
+def _results(options: Namespace, take: Take) -> Prepared[Printed]:
+    from analysis.report.provenance import SCHEMA_VERSION
+    from analysis.report.result_directory import RESULTS, numbered_results
+
+    rows = [(str(path), _changed(path), _title(path)) for path in numbered_results()]
+    listed = [{"out": out, "time": at, "title": title} for out, at, title in rows]
+    text = "\n".join("  ".join(row) for row in rows)
+    return _printed(
+        {"schema_version": SCHEMA_VERSION, "results": listed},
+        text or f"no results under {RESULTS}/; 'phonotaxis simulate' writes some",
+    )
+
+
+def _changed(path: Path) -> str:
+    local = datetime.fromtimestamp(path.stat().st_mtime, UTC).astimezone()
+    return local.strftime("%Y-%m-%d %H:%M")
+
+
+def _title(path: Path) -> str:
+    """Returns the title of the page in a result directory, or its first file's name."""
+    page = path / "report.html"
+    try:
+        with page.open(encoding="utf-8") as file:
+            found = re.search(r"<title>(.*?)</title>", file.read(2_000))
+    except OSError:
+        found = None
+    if found:
+        return html.unescape(found[1])
+    names = sorted(each.name for each in path.iterdir())
+    return ", ".join(names[:3]) or "empty"
+
+
+def _listing(plural: str, about: str, rows: Listing) -> Prepared[Printed]:
     """Lists names, each with one line of text; the words are keys of the document."""
     from analysis.report.provenance import SCHEMA_VERSION
 
-    width = max(map(len, rows))
-    text = "\n".join(f"{name:<{width}}  {line}" for name, line in rows.items())
     listed = [{"name": name, about: line} for name, line in rows.items()]
-    return _printed({"schema_version": SCHEMA_VERSION, plural: listed}, text)
+    return _printed({"schema_version": SCHEMA_VERSION, plural: listed}, repr(rows))
 
 
 def _printed(
@@ -177,23 +292,32 @@ def _doctor(options: Namespace, take: Take) -> Prepared[Printed]:
 
 SCENARIOS = Command(
     "scenarios",
-    "list the library's scenarios",
-    take_json,
+    "list the library's scenarios, or print or copy one",
+    _add_scenarios_arguments,
     _scenarios,
     examples=(
         "scenarios",
-        "scenarios --json",
+        "scenarios u_trap",
+        "scenarios u_trap --copy my_scenario.yaml",
     ),
+    synonyms=("list", "show"),
 )
 LAWS = Command(
     "laws",
-    "list the laws that can be named",
-    take_json,
+    "list the laws that can be named, or describe one",
+    _add_laws_arguments,
     _laws,
     examples=(
         "laws",
-        "laws --json",
+        "laws active",
     ),
+)
+RESULTS = Command(
+    "results",
+    "list the result directories under results/",
+    take_json,
+    _results,
+    examples=("results",),
 )
 FIELDS = Command(
     "fields",

@@ -133,5 +133,7 @@ COMMAND = Command(
         "simulate my_scenario.yaml --seed 7 --out results/mine",
         "simulate --set source.speed_m_s=0.2 --set hearing=ideal --json",
         "simulate --law my_laws.py:soft --no-plots",
+        "simulate results/latest",
     ),
+    synonyms=("run", "start"),
 )

@@ -6,11 +6,9 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from phonotaxis.commands.arguments import (
-    LAW_HELP,
-    LAW_WORDS,
-    completed_by,
     overrides,
     say,
+    take_laws,
     take_output,
     take_scenario,
 )
@@ -22,14 +20,11 @@ if TYPE_CHECKING:
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    law = parser.add_argument(
-        "--law",
-        metavar="LAW",
-        action="append",
-        help=f"{LAW_HELP}; may be repeated to compare laws; all: the laws that avoid "
-        "obstacles, or that drive on a route (default: the scenario's law)",
+    take_laws(
+        parser,
+        "all: the laws that avoid obstacles by a force, or that drive on a route "
+        "(default: the scenario's law)",
     )
-    completed_by(law, LAW_WORDS)
     parser.add_argument(
         "--robot",
         metavar="NAME",
@@ -48,14 +43,15 @@ def _prepare(options: Namespace, take: Take) -> Prepared[StabilityResult]:
     from analysis.stability.choice import chosen_laws, chosen_robot
     from diagrams.scenario.loading import load_scenario
     from diagrams.scenario.scenario_files import check_files
+    from diagrams.scenario.suggestions import law_names
 
     take(options.out)
     whole = load_scenario(options.scenario, overrides(options))
     scenario, note = chosen_robot(whole, options.robot)
-    scenarios = chosen_laws(scenario, options.law or [])
+    scenarios = chosen_laws(scenario, law_names(options.law))
     for each in scenarios:
         check_files(each)
-    say(f"analysing {whole.name}")
+    say(f"analyzing {whole.name}")
 
     from phonotaxis.loops import prepare_stability
 

@@ -14,6 +14,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Strict
 
+from systems.framework.input_error import InputError
+
 # The ranges are decades wider than any robot on a floor needs. A value outside its
 # range is a typing error. Such a value would cause an overflow or an endless run. A
 # field that needs a narrower range defines its own range.
@@ -62,6 +64,17 @@ class Parameters(BaseModel):
         strict=True,
         allow_inf_nan=False,
     )
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuses every assignment, because results belong to unchanged parameters."""
+        if name.startswith("_"):
+            super().__setattr__(name, value)
+            return
+        raise InputError(
+            name,
+            "cannot be assigned; make a changed copy, for example "
+            "scenario.with_(law='active', **{'source.speed_m_s': 0.2})",
+        )
 
     def model_copy(
         self, *, update: Mapping[str, Any] | None = None, deep: bool = False

@@ -118,4 +118,5 @@ def _unknown(
         )
     if constant := constant_now(".".join(loc[3:] if loc[0] == "robots" else loc)):
         return f"is no longer a field; it is now {constant}; remove it"
-    return f"is not a field of {what}; remove it{near_field(schema, place)}"
+    hint = near_field(schema, place)
+    return f"is not a field of {what}{hint or '; remove it'}"

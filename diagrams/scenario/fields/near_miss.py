@@ -10,11 +10,14 @@ from diagrams.scenario.suggestions import did_you_mean
 
 #: Groups of synonyms with different letters; scenarios use one word of each group.
 _SAME_THING = (
-    ("position", "location", "place", "pose", "center", "center", "xy", "waypoints"),
+    ("position", "location", "place", "pose", "center", "centre", "xy", "waypoints"),
     ("size", "dimensions", "extent", "extents"),
     ("speed", "velocity"),
     ("heading", "angle", "yaw", "orientation", "theta"),
 )
+
+#: Groups whose fields users change most.
+_USUAL = ("source", "robot", "obstacles", "attraction", "room", "microphones")
 
 
 def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
@@ -22,10 +25,11 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
 
     The function suggests the first of these fields that exists:
 
-    1. a field in the same group with a similar name
+    1. a field in the same group with this name and a unit
     2. a field in the same group with the same meaning
-    3. a field in a lower group with the same name
-    4. a field anywhere with the same name
+    3. a field in a lower group with this name, with or without a unit
+    4. a field anywhere with this name, with or without a unit
+    5. a field in the same group with a similar name
 
     Args:
         schema: JSON Schema of the whole data.
@@ -35,12 +39,36 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
         A text for the error message, empty if there is no such field.
     """
     *parents, last = place
-    siblings = at_place(schema, parents)
+    siblings = list(at_place(schema, parents))
     return (
-        did_you_mean(last, siblings)
+        _meant(each for each in siblings if each.startswith(f"{last}_"))
         or _of_that_meaning(last, siblings)
         or _elsewhere(schema, place)
+        or did_you_mean(last, siblings)
     )
+
+
+def fields_called(schema: Mapping[str, Any], name: str) -> list[str]:
+    """Returns the paths of all fields with a name, with or without a unit.
+
+    Fields of the run come first, then those of the source, the robot and obstacles.
+    """
+    found = [
+        path
+        for path in leaf_paths(schema)
+        if path[-1] == name or path[-1].startswith(f"{name}_")
+    ]
+
+    def rank(path: Sequence[str]) -> tuple[int, int]:
+        usual = _USUAL.index(path[0]) if path[0] in _USUAL else len(_USUAL)
+        return 0 if len(path) == 1 else 1 + usual, len(path)
+
+    return [".".join(path) for path in sorted(found, key=rank)]
+
+
+def _meant(names: Iterable[str]) -> str:
+    found = next(iter(names), "")
+    return f" (did you mean {found!r}?)" if found else ""
 
 
 def _of_that_meaning(name: str, siblings: Iterable[str]) -> str:
@@ -50,17 +78,17 @@ def _of_that_meaning(name: str, siblings: Iterable[str]) -> str:
         return field.casefold().partition("_")[0]
 
     alike = next((words for words in _SAME_THING if told(name) in words), ())
-    found = next((field for field in siblings if told(field) in alike), "")
-    return f" (did you mean {found!r}?)" if found else ""
+    return _meant(field for field in siblings if told(field) in alike)
 
 
 def _elsewhere(schema: Mapping[str, Any], place: Sequence[str]) -> str:
     """Suggests a field elsewhere with this name, or with this name and a unit."""
     *parents, name = place
-    below = ((*parents, *path) for path in leaf_paths(schema, parents))
-    for paths in (list(below), list(leaf_paths(schema))):
-        named = [path for path in paths if path[-1] == name]
-        found = named or [path for path in paths if path[-1].startswith(f"{name}_")]
-        if found:
-            return f" (did you mean {min(map('.'.join, found), key=len)!r}?)"
-    return ""
+    below = [
+        (*parents, *path)
+        for path in leaf_paths(schema, parents)
+        if path[-1] == name or path[-1].startswith(f"{name}_")
+    ]
+    if parents and below:
+        return _meant([min(map(".".join, below), key=len)])
+    return _meant(fields_called(schema, name))

@@ -1,0 +1,147 @@
+"""Understands words that users guess: names of commands, options and fields."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+
+_IN_RESULTS = (
+    "every result directory holds its pictures and pages; 'phonotaxis results' lists "
+    "these directories"
+)
+_CHECKED = "each command checks its input before it runs; see 'phonotaxis scenarios'"
+
+#: What to do instead of a command that does not exist. A text names the line to type.
+_NO_COMMANDS = {
+    "plot": f"{_IN_RESULTS}, and 'phonotaxis simulate' writes a new one",
+    "view": _IN_RESULTS,
+    "open": _IN_RESULTS,
+    "replay": f"{_IN_RESULTS}; open replay.html in a browser",
+    "movie": "use 'phonotaxis simulate --movie FILE.mp4'",
+    "report": f"{_IN_RESULTS}; open report.html in a browser",
+    "init": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
+    "new": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
+    "create": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
+    "validate": _CHECKED,
+    "check": _CHECKED,
+    "docs": "'phonotaxis COMMAND --help' describes a command; the folder docs has more",
+    "config": "use 'phonotaxis fields', which lists all settings",
+    "linearize": "use 'phonotaxis stability', which writes the linear models",
+    "record": "use 'phonotaxis listen', or record a file and use 'phonotaxis locate'",
+}
+#: What to do instead of an option that does not exist in any command.
+_NO_OPTIONS = {
+    "gui": "the result directory holds replay.html for a browser",
+    "plot": "pictures are in the result directory; see --no-plots",
+    "verbose": "--debug prints the traceback of an error",
+    "v": "--debug prints the traceback of an error; phonotaxis --version the version",
+    "no-audio": "sound is written only with --save-audio DIR",
+    "realtime": "open replay.html of the result directory, which plays in real time",
+    "list-devices": "'phonotaxis doctor' lists the sound cards",
+}
+#: Names that users guess for options of other names.
+_OPTIONS = {
+    "array": "geometry",
+    "output": "out",
+    "output-dir": "out",
+    "dir": "out",
+    "resolution": "rate",
+    "jobs": "workers",
+    "processes": "workers",
+    "trials": "runs",
+    "wav": "sound",
+    "gains": "set",
+}
+
+
+def meant_words(words: Sequence[str]) -> list[str]:
+    """Replaces ``help`` and ``version`` by the options that they stand for."""
+    if words[:1] == ["help"]:
+        return [*words[1:2], "--help"]
+    if words[:1] == ["version"]:
+        return ["--version"]
+    return list(words)
+
+
+def no_command(word: str, commands: Collection[str]) -> str:
+    """Returns the message for a word that is not the name of a command."""
+    if word in _NO_COMMANDS:
+        return f"{word!r} is not a command; {_NO_COMMANDS[word]}"
+    from diagrams.scenario.suggestions import did_you_mean
+
+    hint = did_you_mean(word, commands)
+    return f"{word!r} is not a command{hint}; 'phonotaxis --help' lists the commands"
+
+
+def no_option(
+    command: str,
+    unknown: Sequence[str],
+    words: Sequence[str],
+    options: Mapping[str, Collection[str]],
+) -> str:
+    """Returns the message for words that a command does not know.
+
+    The message names the line to type if the user's intention is clear: the field of a
+    scenario with this name, an option of the command with a similar name, or other
+    commands that have the option.
+
+    Args:
+        command: Name of the command.
+        unknown: Unknown words of the command line, at least one.
+        words: All words of the command line.
+        options: Names of the options of each command, without dashes.
+    """
+    text = f"unrecognized arguments: {' '.join(unknown)}"
+    own = options[command]
+    found = re.match(r"--?([A-Za-z][\w-]*)(?:=(.*))?$", unknown[0])
+    if found is None:
+        return f"{text}{_no_word(unknown[0], own)}"
+    name, value = found[1], found[2] or _next_word(words, unknown[0])
+    if name == "scenario" and "set" in own:
+        return f"{text}; write phonotaxis {command} {value or 'SCENARIO'}"
+    if name in _NO_OPTIONS:
+        return f"{text}; {_NO_OPTIONS[name]}"
+    hint = _of_field(name, value) if "set" in own else ""
+    return f"{text}{hint or _of_option(name, own, options)}"
+
+
+def _next_word(words: Sequence[str], word: str) -> str:
+    """Returns the value after an option; empty if there is none."""
+    after = [*words[words.index(word) + 1 :], ""] if word in words else [""]
+    return "" if after[0].startswith("-") and not after[0][1:2].isdigit() else after[0]
+
+
+def _no_word(word: str, own: Collection[str]) -> str:
+    if "=" in word and "set" in own:
+        return f"; write --set {word}"
+    return ""
+
+
+def _of_field(name: str, value: str) -> str:
+    """Names the fields of a scenario that are called like the option."""
+    from diagrams.scenario.fields.field_list import list_fields
+    from diagrams.scenario.fields.near_miss import fields_called
+    from diagrams.scenario.fields.shipped import scenario_schema
+
+    schema, word = scenario_schema(), name.replace("-", "_")
+    groups = {each.path for each in list_fields(schema) if "group" in each.kind}
+    paths = [path for path in fields_called(schema, word) if path not in groups]
+    listed = f"'phonotaxis fields {word}'"
+    if not paths:
+        return f"; {listed} lists its fields, for --set" if word in groups else ""
+    text = f"; write --set {paths[0]}={value or 'VALUE'}"
+    return text if len(paths) == 1 else f"{text}, or see {listed}"
+
+
+def _of_option(
+    name: str, own: Collection[str], options: Mapping[str, Collection[str]]
+) -> str:
+    if _OPTIONS.get(name) in own:
+        return f" (did you mean '--{_OPTIONS[name]}'?)"
+    from diagrams.scenario.suggestions import did_you_mean
+
+    # The names have no dashes, which would make all options look similar.
+    if hint := did_you_mean(name, own).replace("'", "'--", 1):
+        return hint
+    others = [each for each, known in options.items() if name in known]
+    return f" (--{name} is an option of {', '.join(others)})" if others else ""
