@@ -13,8 +13,9 @@ count in L:
 - g > 0, which adds energy while the robot moves away (``printed`` term only)
 - g < 0, which adds energy while the robot approaches
 
-The damping of the attraction removes the power D_r |v|^2. If L <= D_r, the energy
-without the velocity term still cannot grow, and all conclusions from it remain valid.
+The damping of the attraction removes the power D_r |v|^2. If L <= D_r, the velocity
+term cannot make the kinetic plus potential energy grow. Conclusions from this energy
+are then valid for a law with this term, too.
 """
 
 from __future__ import annotations

@@ -154,7 +154,7 @@ class IdealLoop:
         return self._twin_blocks[role] if twin else self.follower.blocks[role]
 
     def _names(self) -> tuple[str, ...]:
-        """Names ``part.element`` of all states. Elements without a name are numbered."""
+        """Names ``part.element`` of all states, with numbers for unnamed elements."""
         context = self.follower.diagram.CreateDefaultContext()
         continuous: list[str] = []
         discrete: list[str] = []
@@ -269,7 +269,7 @@ class IdealLoop:
         v_WP: tuple[float, float] = (0.0, 0.0),
         begin_s: float = 0.0,
     ) -> tuple[NDArray[np.float64], float]:
-        """Returns the state (n,) after a long steady motion, and the time of the state, s.
+        """Returns the state (n,) after a long steady motion, and its time, s.
 
         The motion lasts SETTLING_TICKS control periods. It begins at ``begin_s`` with
         the robot at ``pose_WB``, m and rad. The acceleration from the law is replaced

@@ -44,7 +44,7 @@ _STEADY_S = 20.0
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Equilibrium of the closed loop: the robot rests or follows at constant velocity."""
+    """Equilibrium of the loop: the robot rests, or follows at constant velocity."""
 
     loop: IdealLoop = field(repr=False)
     p_WP: NDArray[np.float64]
