@@ -4,10 +4,10 @@ A burst cycle is one period of the source, for example 0.5 s of sound and 1.5 s 
 silence. During the silence, the tracker holds the target in the world frame W, holds it
 relative to the robot, or moves it at its last estimated velocity.
 
-In each control period, a matrix maps small deviations of the state from an equilibrium
-to those one control period later. The product of these matrices over a cycle maps
-deviations before the cycle to deviations after it. The eigenvalues of the product are
-the multipliers of the cycle.
+For each control period, a matrix maps small deviations from an equilibrium at the
+beginning of the period to deviations at the end. The product of these matrices over a
+cycle maps deviations before the cycle to deviations after it. The eigenvalues of the
+product are the multipliers of the cycle.
 """
 
 from __future__ import annotations

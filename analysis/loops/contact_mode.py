@@ -7,9 +7,9 @@ limit the stiffness. In this module, "latency" is the age of the echo.
 
 The model from acceleration to motion uses the blocks of the diagram. Drake linearizes
 the plant and converts it exactly to sampled time. AutoDiff linearizes the block that
-commands the wheels. The dependence of the push on speed (velocity term) is left out:
-with the definition of speed in the papers, it has no damping on average over an
-oscillation in front of an obstacle at rest.
+commands the wheels. The velocity term, which is the part of the push that depends on
+speed, is left out. With the definition of speed in the papers, this term has no damping
+on average over an oscillation in front of an obstacle at rest.
 """
 
 from __future__ import annotations
@@ -241,9 +241,8 @@ class ContactLimits:
 def contact_limits(scenario: Scenario) -> ContactLimits:
     """Computes the largest stable gains of the conventional and of the active law.
 
-    The stiffness of the attraction is subtracted from the largest stable stiffness
-    before it is converted to gains. The motor lag of the scenario is one of the rows of
-    the tables.
+    The gains follow from the largest stable stiffness minus the stiffness of the
+    attraction. The motor lag of the scenario is one of the rows of the tables.
     """
     lags = sorted({*_MOTOR_LAGS_S, scenario.only.plant.motor_lag_s})
     total = np.array(

@@ -102,10 +102,9 @@ class EquilibriumSearch:
         """Returns the length of the shortest free path from the start to a point, m.
 
         The path is that of the control point P. It keeps a distance of half the robot's
-        width from every body. If the point is nearer to a body, the path keeps only the
-        point's distance from all bodies. If the start is nearer to a body, the path
-        keeps only the start's distance from this body. Without a path, the length is
-        infinite.
+        width from every body, or the clearance of the point if this is smaller. If the
+        start is even nearer to a body, the path keeps only the start's distance from
+        this body. Without a path, the length is infinite.
         """
         return self._way(point, self.scenario.only.robot.width_m / 2.0)
 
@@ -225,9 +224,9 @@ def find_equilibria(
     The search assumes exact sensors, and bodies that rest where they are at 0 s. Use
     ``frozen_scenario`` for another time. ``area_m`` bounds the positions of the control
     point P in W. By default, it contains all bodies and the start, with a margin of the
-    follow distance plus 1 m. In the first round, cells with an edge of at most
-    ``smallest_m`` are not divided any more. Raises InputError if the area is empty or
-    the law has no derivative.
+    follow distance plus 1 m. Cells are divided until their edge is at most
+    ``smallest_m``, and further if they may contain a place of rest but none is found.
+    Raises InputError if the area is empty or the law has no derivative.
     """
     if not smallest_m > 0.0:
         raise InputError("smallest_m", f"is {smallest_m}; give a positive length in m")

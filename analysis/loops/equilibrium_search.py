@@ -304,7 +304,7 @@ class CellSearch:
             return np.asarray(np.linalg.norm(fixed, axis=1) > change)
 
         def least(direction: Floats) -> Floats:
-            """(n, 2) possible forces with the smallest component along (n, 2) units."""
+            """(n, 2) possible forces with the smallest components along directions."""
             along = np.einsum("knj,nj->kn", pushes, direction)
             rank = np.where(maybe, along, np.inf).argsort(axis=0).argsort(axis=0)
             chosen = maybe & (rank < missing)
@@ -327,7 +327,7 @@ class CellSearch:
         return clear
 
     def _depth(self, points: Floats) -> Floats:
-        """(n,) depth of points inside a body, m; negative outside all bodies."""
+        """(n,) distances of points inside a body from its outline, m; outside: < 0."""
         depth = np.full(len(points), -np.inf)
         for x, y, theta, length, width in self._bodies:
             u, v = rotate(-theta, points[:, 0] - x, points[:, 1] - y)

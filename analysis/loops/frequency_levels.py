@@ -157,7 +157,7 @@ def _shifts(model: LinearModel) -> list[float]:
 
 
 def with_middles(omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns sorted frequencies, and the geometric mean of each two neighbors."""
+    """Returns the frequencies and the geometric means of neighbors, sorted."""
     omega = np.unique(omega)
     return np.sort(np.concatenate((omega, np.sqrt(omega[:-1] * omega[1:]))))
 

@@ -134,8 +134,8 @@ class OperatingPoint:
         """Kind of the equilibrium, by the number of growing modes of the motion.
 
         Without growing modes, the point is a ``sink``. With one, it is a ``saddle``.
-        With two or more, it is a ``source``, which is not the source of sound. A
-        growing oscillation counts as one mode.
+        With two or more, it is a ``source``; this term has nothing to do with the
+        source of sound. A growing oscillation counts as one mode.
         """
         growing = self.eigenvalues[self.eigenvalues.real >= 0.0]
         directions = int(np.sum(growing.imag >= -1e-9))

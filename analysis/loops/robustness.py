@@ -41,7 +41,7 @@ class UncertainParameter:
     """Parameter that is known only to lie in an interval."""
 
     name: str
-    """Field of the scenario, or another name that the pole function knows."""
+    """Name of a field of the scenario, or another name that the pole function knows."""
     symbol: str
     unit: str
     nominal: float
@@ -149,9 +149,10 @@ def pole_cloud(
 
     The random values are a Latin hypercube. A search for the worst corner begins at the
     nominal values. It moves one parameter at a time to an end of its interval, and
-    keeps each move that slows the decay. If the decay changes monotonically with each
-    parameter, the search finds the worst corner. The worst case is the worse of this
-    corner and the worst sample. ``period`` is the control period, s.
+    keeps each move that slows the decay. The search finds the worst corner if each
+    parameter changes the decay in one direction only, whatever the values of the other
+    parameters are. The worst case is the worse of this corner and the worst sample.
+    ``period`` is the control period, s.
     """
     from scipy.stats import qmc
 

@@ -1,7 +1,7 @@
 """Trials in which a driver tries to make a robot with a guard touch obstacles at rest.
 
-A driver is a program that commands the robot, or a law. A layout is a random
-arrangement of obstacles. A setting, also called variant, is a set of changes of the
+A driver is a law or another program that commands the robot. A layout is a random
+arrangement of obstacles. A setting, also called a variant, is a set of changes of the
 robot's parameters.
 """
 

@@ -245,9 +245,9 @@ def _summed(runs: Sequence[LongRun]) -> list[str]:
 
 
 def long_summary(found: Mapping[int, Sequence[LongRun]], seed: int) -> dict[str, Any]:
-    """Builds the JSON document of long runs. ``found`` has the runs of each job.
+    """Builds the JSON document of long runs.
 
-    The keys of ``found`` are the numbers of the jobs.
+    ``found`` has the runs of each job, by number of the job.
     """
 
     def told(job: int, run: LongRun) -> dict[str, Any]:
