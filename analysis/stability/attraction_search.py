@@ -199,7 +199,7 @@ class RecommendedGains:
 
     @property
     def command(self) -> str:
-        """Command line that simulates the recommended gains; empty if none are found."""
+        """Command line that simulates the recommended gains; empty if none exist."""
         if self.chosen is None:
             return ""
         name = self.scenario.name

@@ -112,7 +112,7 @@ def _barrier_gains(
 def _matched_gains(
     scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
-    """Derives all four gains of the active law of 2019: of its spring and its damper."""
+    """Derives all four gains of the active law of 2019 by the rule ``matched``."""
     # The damper term depends on the push by a far echo, and this push includes the
     # tail of the spring term. Only the second round has the final tail.
     for _ in range(2):

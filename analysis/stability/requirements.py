@@ -77,7 +77,7 @@ class Check:
         return self.ratio >= 1.0 - _ROUNDING
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns fields, ``ratio``, ``met`` and ``acceptable`` for the JSON document."""
+        """Returns the fields and the three properties for the JSON document."""
         results = ("ratio", "met", "acceptable")
         return vars(self) | {name: getattr(self, name) for name in results}
 
@@ -125,7 +125,7 @@ class Requirements:
         return replace(self, rest_offset_m=scenario.stop.goal_margin_m)
 
     def loop(self) -> Iterator[tuple[str, Requirement]]:
-        """Yields the requirements on the loop, each with its field of ``GainFigures``."""
+        """Yields requirements on the loop, each after its field of ``GainFigures``."""
         for field, name, unit in (
             ("damping_ratio", "damping ratio", "1"),
             ("phase_margin_deg", "phase margin", "deg"),
