@@ -161,8 +161,8 @@ class AdaptationStability:
     drift: Drift
     jam: Jam
     critical: CriticalRate
-    """Critical rate for the amplitude K_e S/K. This is the lead of the target over P at
-    which the target pulls P through a contact; see ``pull_through_m``."""
+    """Critical rate for the amplitude ``pull_through_m``. If the target leads P by this
+    distance, it pulls P through a contact."""
     products: tuple[CriticalRate, ...]
     """Critical rates for the amplitudes 0.3 m, 1 m and 3 m, to compare their
     products."""

@@ -204,11 +204,11 @@ class ChainRun:
 def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
     """Simulates eight robots on a line, of which the first oscillates.
 
-    ``peak`` gives the feed-forward, the spacing and the frequency, at which the chain
-    amplifies most. If the chain amplifies at no frequency, the first robot oscillates
-    at the natural frequency of a robot. The simulation lasts forty periods. The
-    amplitudes in the result are those of the last five periods. ``name`` is the name of
-    the result.
+    ``peak`` gives the feed-forward and the spacing of the chain. It also gives the
+    frequency of the oscillation, at which the chain amplifies most. If the chain
+    amplifies at no frequency, the oscillation has the natural frequency of a robot. The
+    simulation lasts forty periods. The amplitudes in the result are those of the last
+    five periods. ``name`` is the name of the result.
     """
     natural = math.sqrt(route_law(scenario).stiffness_n_m / scenario.only.robot.mass_kg)
     omega = peak.frequency_rad_s if peak.grows else natural

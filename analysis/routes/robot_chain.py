@@ -104,19 +104,20 @@ class RobotChain:
     peaks: dict[str, ChainPeak]
     """Amplifications of each kind of chain, by name of the kind."""
     least_damping_n_s_m: float
-    """Least damping D with which two robots apart, without feed-forward, do not amplify
-    motions, N s/m. Infinite if no tried D suffices."""
+    """Least damping D with which a chain of two robots does not amplify motions, N s/m.
+    The chain is apart and has no feed-forward. Infinite if no tried D suffices."""
     least_damping_in_contact_n_s_m: float
     """The same for eight robots in contact, N s/m."""
     most_feed_forward: float
-    """Largest feed-forward with which two robots apart do not amplify motions, as a
-    share of the velocity of the robot ahead. -1 if they amplify motions even without
-    feed-forward."""
+    """Largest feed-forward with which a chain of two robots that is apart does not
+    amplify motions: velocity of the target divided by that of the robot ahead. -1 if
+    the chain amplifies motions even without feed-forward."""
     dampings: NDArray[np.float64]
     """(n,) tried values of D, N s/m."""
     peaks_by_damping: NDArray[np.float64]
-    """(n, 2) largest amplification over frequency by two robots apart, for each tried
-    D: with, and without feed-forward. Infinite if the motion is unstable."""
+    """(n, 2) largest amplification over all frequencies by a chain of two robots that
+    is apart, for each tried D: with feed-forward, and without. Infinite if the chain is
+    unstable."""
 
     @property
     def time_headway_s(self) -> float:
@@ -134,8 +135,9 @@ def robot_chain(scenario: Scenario) -> RobotChain:
     All robots are like the scenario's robot. Each robot's target is a fixed distance
     behind the robot ahead. With feed-forward, the target has the velocity of the robot
     ahead; without, it has the velocity 0. The object sensor measures the position of
-    the robot ahead. The velocity is computed from its last two positions. The function
-    raises an InputError if the law is not for a route, or if the wheels can slip.
+    the robot ahead. The velocity of the robot ahead is computed from the last two
+    measured positions. The function raises an InputError if the law is not for a route,
+    or if the wheels can slip.
     """
     own = route_law(scenario)
     k, d = own.stiffness_n_m, own.damping_n_s_m
@@ -188,9 +190,10 @@ def disc_offsets(scenario: Scenario) -> tuple[float, float]:
     """Computes how much nearer a neighbor's disc is than its control point P, m.
 
     Other robots observe a moving robot as the disc that encloses it. The disc has its
-    center at the axle, and P is ahead of the axle. The first result is for the robot
-    ahead, and the second for the robot behind: distance between the points P of both
-    robots, minus the distance from the own P to the disc of the neighbor.
+    center at the axle, and P is ahead of the axle. Each result is the distance between
+    the points P of two neighbors, minus the distance from one of these points to the
+    disc of the other robot. In the first result, the other robot is ahead. In the
+    second, it is behind.
     """
     disc = 0.5 * math.hypot(scenario.only.robot.length_m, scenario.only.robot.width_m)
     epsilon = scenario.only.robot.control_point_m

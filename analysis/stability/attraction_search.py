@@ -104,8 +104,8 @@ class GainFigures:
     settling_s: float
     """Time in which a small deviation falls to 2 %, s."""
     largest_law_stiffness_n_m: float
-    """Largest stiffness that a law may have for a stable motion in front of an
-    obstacle, N/m."""
+    """Largest stiffness of a law with which the motion in front of an obstacle is
+    stable, N/m."""
 
 
 @dataclass(frozen=True)
@@ -370,10 +370,10 @@ def _whole_loop(chosen: Scenario) -> WholeLoop:
 def least_damping(
     scenario: Scenario, K_r: float, requirements: Requirements
 ) -> GainChoice:
-    """Finds the least damping D_r that meets the requirements with a given K_r, N/m.
+    """Finds the least damping D_r that meets the requirements for one stiffness K_r.
 
-    D_r is at most three times the damping that is critical for K_r and the virtual
-    mass.
+    ``K_r`` is in N/m. D_r is at most three times the damping that is critical for K_r
+    and the virtual mass.
     """
     critical = 2.0 * math.sqrt(K_r * scenario.only.robot.mass_kg)
 
@@ -433,7 +433,7 @@ def _margins(loop: LoopMargins) -> dict[str, float]:
 
 
 def _contact(scenario: Scenario, requirements: Requirements) -> LinearModel:
-    """Returns the motion in front of an obstacle at the distance of stiffest repulsion.
+    """Returns the motion in front of an obstacle, at the distance of the stiffest push.
 
     Echoes are late by ``spare_latency_ticks``.
     """
@@ -447,9 +447,9 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
     """Returns the sampled open loop of the attraction without the force of the law.
 
     The attraction consists of a spring and a damper. The robot moves along the line to
-    a source at rest. With a cut at the ``sensor``, the spring is in the open loop, and
-    the damper remains closed. With a cut at the ``actuator``, spring and damper are in
-    the open loop. The input and the output are accelerations, m/s^2.
+    a source at rest. A cut at the ``sensor`` opens the feedback by the spring, and the
+    feedback by the damper stays closed. A cut at the ``actuator`` opens the feedback by
+    spring and damper. The input and the output are accelerations, m/s^2.
     """
     chain = motion_chain(scenario)
     mass = scenario.only.robot.mass_kg
@@ -469,7 +469,7 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
 def gain_figures(scenario: Scenario, requirements: Requirements) -> GainFigures:
     """Computes performance figures of the stiffness K_r and damping D_r of a scenario.
 
-    ``requirements`` only gives the latency ``spare_latency_ticks``.
+    Only the field ``spare_latency_ticks`` of ``requirements`` is used.
     """
     both = [_margins(loop_margins(attraction_loop(scenario, at))) for at in _CUTS]
     worst = {

@@ -72,8 +72,8 @@ class Alternative:
     meters_to_go: float
     """Distance from an obstacle to the follow point behind it, m."""
     allowed_stiffness_n_m: float
-    """Largest stiffness that a law may have for a stable motion in front of an obstacle
-    with late echoes, N/m."""
+    """Largest stiffness of a law with which the motion in front of an obstacle is
+    stable although echoes are late, N/m."""
     laws: tuple[LawDesign, ...]
     jams: tuple[JamRuns, ...]
     """Simulated runs past two obstacles to the goal, one entry per law."""
@@ -109,11 +109,11 @@ class DesignStudy:
     """Kinetic energy of the virtual mass at top speed, J."""
     barriers: tuple[BarrierRow, ...]
     contact_limits_n_m: tuple[float, ...]
-    """Largest stiffness that a law may have for a stable motion in front of an obstacle
-    if echoes are 0, 1, 2, and 4 ticks late, N/m."""
+    """Largest stiffness of a law with which the motion in front of an obstacle is
+    stable if echoes are 0, 1, 2, and 4 ticks late, N/m."""
     today: Alternative
-    """The current attraction, with new gains of the laws. With these gains, the push
-    away from the leader may shift P at rest as far as the edge of the goal."""
+    """The current attraction, with new gains of the laws. The requirements on these
+    gains let the push away from the leader shift P at rest to the edge of the goal."""
     recommended: Alternative
     """The recommended attraction, with gains of all laws for this attraction."""
 

@@ -56,9 +56,9 @@ def search_gains(
 ) -> LawGains:
     """Returns the gains of all laws of a scenario, with new gains for ``laws``.
 
-    ``laws`` are names from ``DESIGNED_LAWS``. The search only changes their stiffness
-    and damping; reaches, speed limits, and saturations stay. Raises InputError if no
-    gain meets a requirement that must be met.
+    ``laws`` are names from ``DESIGNED_LAWS``. The search changes only the stiffness and
+    damping of these laws; reaches, speed limits, and saturations stay. Raises
+    InputError if no gain meets a requirement that must be met.
     """
     for law in laws:
         rule = _RULES[DESIGNED_LAWS[law].rule]
@@ -76,10 +76,10 @@ def gain_for_barrier(
     """Returns the value of a gain with which a law just stops the robot at an obstacle.
 
     During the approach, the push of the law minus the pull of the attraction must
-    remove the kinetic energy of top speed. ``field`` is the name of the gain, in N/m or
-    N m. The push is proportional to this gain. ``also`` has other gains of the law, as
-    multiples of this gain. Raises InputError if no value from 1e-3 to 1e5 stops the
-    robot.
+    remove the kinetic energy that the robot has at top speed. ``field`` is the name of
+    the gain, which is in N/m or N m. The push is proportional to this gain. ``also``
+    has other gains of the law, as multiples of this gain. Raises InputError if no value
+    from 1e-3 to 1e5 stops the robot.
     """
     to_go, energy = meters_to_go(scenario, requirements), kinetic_energy(scenario)
 

@@ -55,8 +55,8 @@ class Check:
     def ratio(self) -> float:
         """Value/bound for a lower bound, bound/value for an upper bound.
 
-        The requirement is met from 1 on. If the divisor is 0 or less, the ratio is
-        infinite.
+        The requirement is met if this ratio is at least 1. If the divisor is 0 or less,
+        the ratio is infinite.
         """
         good, bad = self.value, self.bound
         if not self.at_least:

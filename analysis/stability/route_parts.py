@@ -168,7 +168,7 @@ class SpringBounds:
     def share(self) -> float:
         """Total stiffness divided by the largest stable stiffness.
 
-        The positions that the springs use are one control period late.
+        This limit holds if the springs use positions that are one control period late.
         """
         bound = self.bounds.stable_today_n_m[-1]
         return self.total_stiffness_n_m / bound if bound > 0.0 else math.inf

@@ -387,9 +387,10 @@ def _all_wires(diagram: Diagram, *, flat: bool) -> list[Wire]:
 
 
 def _writer(system: Any, index: Any) -> tuple[Any, Any]:
-    """Returns the block, and the index of its port, behind an output port.
+    """Returns the block that produces an output, and the index of its output port.
 
-    If the port belongs to a nested diagram, a block inside of it produces the output.
+    ``index`` is the output port of ``system``. If ``system`` is a diagram, the block is
+    inside of this diagram.
     """
     while isinstance(system, Diagram):
         system, index = system.get_output_port_locator(index)
@@ -397,9 +398,10 @@ def _writer(system: Any, index: Any) -> tuple[Any, Any]:
 
 
 def _readers(system: Any, index: Any) -> Iterator[tuple[Any, Any]]:
-    """Yields the blocks, and the indices of their ports, behind an input port.
+    """Yields the blocks that read an input, each with the index of its input port.
 
-    If the port belongs to a nested diagram, blocks inside of it read the input.
+    ``index`` is the input port of ``system``. If ``system`` is a diagram, the blocks
+    are inside of this diagram.
     """
     if not isinstance(system, Diagram):
         yield system, index

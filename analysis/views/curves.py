@@ -85,8 +85,8 @@ class Panel(NamedTuple):
     def limits(self) -> tuple[float, float]:
         """Values at the bottom and at the top of the axis.
 
-        Unless ``low`` or ``high`` is set, the axis extends beyond the curves by 5 % of
-        their range. If ``low`` is above ``high``, values increase downward.
+        An end of the axis that is not set by ``low`` or ``high`` is beyond the curves
+        by 5 % of their range. If ``low`` is above ``high``, values increase downward.
         """
         values = np.concatenate([curve.y for curve in self.curves])
         values = values[np.isfinite(values)]

@@ -79,15 +79,18 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
 
 
 def shown_rectangle(result: RunResult) -> tuple[float, float, float, float]:
-    """Returns the part of the floor that a replay shows first, as for ``bounds``."""
+    """Returns the part of the floor that a replay shows first.
+
+    The format is that of ``bounds``.
+    """
     return bounds(result, margin=0.5)
 
 
 def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
-    """Returns the edges of the floor of a replay, as for ``bounds``, in whole meters.
+    """Returns the edges of the floor of a replay in whole meters.
 
-    The floor contains the whole run. It is at least as large as the arena of the
-    scenario.
+    The format is that of ``bounds``. The floor contains the whole run. It is at least
+    as large as the arena of the scenario.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
     width, depth = result.full_scenario.arena_m

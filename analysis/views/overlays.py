@@ -178,8 +178,8 @@ def _arrow(
 ) -> Thing:
     """Makes an arrow that begins at P.
 
-    ``vectors`` are the (n, 2) vectors of the arrow at the ticks, in W, m. Arrows of one
-    robot have different ``number``, which sets their height.
+    ``vectors`` are the (n, 2) vectors of the arrow at the ticks, in W, m. ``number``
+    counts the arrows of a robot, and sets the height of the arrow.
     """
     end = own.simulated_s
     times = np.unique([*np.arange(0.0, end, 1.0 / ARROWS_PER_S), end])

@@ -152,8 +152,8 @@ class _Painter:
     def times_of(self, robot: Thing) -> list[float]:
         """Returns the times at which the picture shows the outline of a robot, s.
 
-        The robot moves by at least 0.25 m from each of these times to the next. The
-        last time is always the end of the run, even if the last motion is shorter.
+        Between consecutive times, the robot moves by at least 0.25 m. The last time is
+        always the end of the run, even if the robot has moved less by then.
         """
         end = self.result.simulated_s
         if self.ends_only:
@@ -164,9 +164,10 @@ class _Painter:
         return [*kept, end] if end > kept[-1] else kept
 
     def apart(self, thing: Thing, times: ArrayLike, least_m: float) -> list[float]:
-        """Selects times from each of which to the next a thing moves by ``least_m``.
+        """Selects some of the ``times``, s, so that drawings of a thing are apart.
 
-        The first of ``times`` is always selected.
+        The first time is always selected. Each later time is selected if the thing is
+        at least ``least_m``, m, from its position at the last selected time.
         """
         kept: list[float] = []
         for time in np.asarray(times, dtype=float).tolist():

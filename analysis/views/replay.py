@@ -95,9 +95,9 @@ def write_replay(
 ) -> None:
     """Writes a self-contained page that plays the run in three dimensions.
 
-    docs/runs.md and docs/searches.md explain what the page shows. ``clearance`` is that
-    of ``page_charts``: for each robot, by name, the (n,) distances to the nearest body
-    at the ticks, m. The page needs a browser with WebGL, but no network.
+    docs/runs.md and docs/searches.md explain what the page shows. ``clearance`` has the
+    (n,) distances to the nearest body at the ticks, m, by name of the robot. The page
+    needs a browser with WebGL, but no network.
     """
     scene = make_scene(result)
     layers = [*scene.layers, *overlays(scene, frame_times(result))]
@@ -467,8 +467,8 @@ class _Recorder:
     def _plume(self, thing: Thing, shape: Plume) -> None:
         """Adds the odor source, and discs that show some puffs of its plume.
 
-        Each disc has a fixed distance from the source. It shows the puff whose distance
-        is nearest to this value.
+        For each disc, there is a fixed distance from the source. The disc shows the
+        puff whose distance from the source is nearest to this value.
         """
         purple, height = "#993380", 0.12
         box, middle = Block(*CONTAINER_M, height), _placed(0.0, 0.0, 0.5 * height)
