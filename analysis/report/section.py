@@ -179,8 +179,6 @@ class Section:
     """Entry of the JSON document; ``plain`` must be able to convert it."""
     verdicts: Sequence[Verdict] = ()
     """Verdicts on the numbers of the section."""
-    fresh: bool = False
-    """Whether the section begins on a new sheet when the page is printed."""
 
 
 #: What a section contains. A text is a paragraph; ``Markup`` is HTML.

@@ -68,8 +68,6 @@ class Part(Generic[Data]):
     """Returns the linear models that are written to files."""
     notes: Callable[[Data], Sequence[str]] = lambda data: ()
     """Returns notes that readers must know before they use the numbers."""
-    fresh: bool = False
-    """Whether the section begins on a new page of paper."""
 
     def section(self, data: Data) -> Section:
         """Returns the section of the report about a data object."""
@@ -79,7 +77,6 @@ class Part(Generic[Data]):
             self.show(data),
             self.document(data) if self.document else data,
             tuple(criterion.judge(data) for criterion in self.criteria),
-            self.fresh,
         )
 
     def problem(self, text: str, *, failed: bool = False) -> Section:
@@ -98,7 +95,6 @@ class Part(Generic[Data]):
                 criterion.without_number(f"the part '{self.title}' has no result")
                 for criterion in self.criteria
             ),
-            self.fresh,
         )
 
 

@@ -381,7 +381,6 @@ LINEAR_MODELS = Part[LinearModels](
     ),
     document=_models_document,
     models=lambda data: (data.continuous, data.sampled, data.at.motion),
-    fresh=True,
 )  # fmt: skip
 
 #: A small step, predicted by the linear model and simulated.

@@ -197,7 +197,7 @@ def _law(analysis: LawAnalysis, anchor: str) -> Section:
         f"SHA-256 of the effective scenario: `{sheet.scenario_sha256}`.",
         *(_drawn(analysis, each, f"{anchor}-{each.key}") for each in sections),
     ]
-    return Section(anchor, law_title(analysis.law), contents, fresh=True)
+    return Section(anchor, law_title(analysis.law), contents)
 
 
 def _drawn(analysis: LawAnalysis, section: Section, anchor: str) -> Markup:
@@ -221,7 +221,7 @@ def _verdicts(verdicts: Sequence[Verdict]) -> Section:
             "source": "source",
         },
     )
-    return Section("verdicts", "Verdicts", [table], fresh=True)
+    return Section("verdicts", "Verdicts", [table])
 
 
 def _model(sheet: ModelSheet) -> Section:
@@ -245,7 +245,7 @@ def _model(sheet: ModelSheet) -> Section:
         ),
         Table(["part", Column("mean", "ms"), "remark"], latencies, "Latency budget"),
     ]
-    return Section("model", "Model sheet", contents, fresh=True)
+    return Section("model", "Model sheet", contents)
 
 
 def _equations(formulas: Sequence[Equation]) -> list[Content]:

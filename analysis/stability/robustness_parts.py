@@ -157,7 +157,6 @@ ROBUSTNESS = Part[LoopRobustness](
         ),
     ),
     document=_document,
-    fresh=True,
 )  # fmt: skip
 
 CONTACT_ROBUSTNESS = Part[LoopRobustness](

@@ -532,9 +532,9 @@ def _odor(scenario: Scenario) -> Iterator[Layer]:
     odor, color = scenario.odor, COLORS["odor"]
     if odor is not None:
         place, start = np.array([[*odor.position_m, 0.0]]), np.zeros(1)
-        shape, label = Plume(scenario), "source of odour"
+        shape, label = Plume(scenario), "source of odor"
         plume = Thing("odor", shape, color, start, place, label=label)
-        yield Layer("odour", "the plume", (color,), [plume])
+        yield Layer("odor", "the plume", (color,), [plume])
 
 
 def lightened(color: str, part: float) -> str:
