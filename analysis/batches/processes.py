@@ -34,7 +34,10 @@ class WorkerProcess:
     """A worker in a separate process; see ``analysis/batches/worker.py``."""
 
     def __init__(self, task: Task) -> None:
-        """Starts the process, which loads the code for the task without running it."""
+        """Starts the process.
+
+        The process loads the code for the task, but does not run the task.
+        """
         ours, theirs = socket.socketpair()
         self.connection = Connection(ours.detach())
         self.tasks: deque[Task] = deque()
