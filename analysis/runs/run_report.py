@@ -15,9 +15,9 @@ from systems.search.search_ending import fault_names
 
 
 def run_document(result: RunResult) -> dict[str, Any]:
-    """Returns the summary of a run as a JSON document, from plain values.
+    """Returns the summary of a run as a JSON document.
 
-    The key ``out`` is None until the files of the run have a directory.
+    The key ``out``, the directory of the run, is still None.
     """
     document = {
         "schema_version": SCHEMA_VERSION,
@@ -99,7 +99,7 @@ def _ended(result: RunResult) -> str:
 def _robot_rows(
     result: RunResult, metrics: dict[str, Any], prefix: str
 ) -> dict[str, str]:
-    """Returns the rows of one robot; their names and metrics begin with the prefix."""
+    """Returns the rows of one robot; ``prefix`` precedes names of rows and metrics."""
     robot, stop = result.scenario.only, result.scenario.stop
 
     def text(name: str) -> str:
