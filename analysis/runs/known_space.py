@@ -57,7 +57,7 @@ class KnownSpace:
         return x, x + wide * self.cell_m, y, y + deep * self.cell_m
 
     def middles(self, cells: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Returns the (m, 2) centers of the m cells for which a mask (i, j) is true."""
+        """Returns the (k, 2) centers of the k cells where a mask (i, j) is true, m."""
         counted = np.argwhere(cells).astype(np.float64)
         return np.array(self.corner_m) + (counted + 0.5) * np.float64(self.cell_m)
 
