@@ -69,8 +69,7 @@ class SavedAudio:
         return self._files.first_heard
 
     def left(self) -> str:
-        """Returns a text about sound that remains after an interrupt; it can be
-        empty."""
+        """Returns a text about sound that remains after an interrupt, if any."""
         if self._files is None or self._files.until_s == 0.0:
             return ""
         return f"the sound until {self._files.until_s:g} s is in {self._shown}"

@@ -38,8 +38,7 @@ class RunResult(diagrams.RunResult, Result):
 
     @classmethod
     def of(cls, result: diagrams.RunResult) -> RunResult:
-        """Converts a result of ``diagrams.simulate``, including those in
-        ``several``."""
+        """Converts a result of ``diagrams.simulate``, also for each robot."""
         values = {each.name: getattr(result, each.name) for each in fields(result)}
         values["several"] = {name: cls.of(own) for name, own in result.several.items()}
         return cls(**values)
