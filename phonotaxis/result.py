@@ -39,7 +39,7 @@ class Output(ABC):
 
 
 class Result(Output):
-    """Result of a public function."""
+    """Result of a public function, and of the command with the same name."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -57,7 +57,7 @@ class Result(Output):
 
     @abstractmethod
     def write(self, document: dict[str, Any], directory: Path) -> None:
-        """Writes the files of the command into an existing directory.
+        """Writes the files of the result into an existing directory.
 
         Args:
             document: The JSON document, with the key ``out``.
@@ -65,7 +65,7 @@ class Result(Output):
         """
 
     def save(self, directory: str | Path | None = None) -> Path:
-        """Writes all files of the command into a new directory.
+        """Writes the files of the result into a new directory.
 
         Args:
             directory: New or empty directory. None means the next number under

@@ -153,7 +153,7 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 
     The table has these columns:
 
-    - Each value of the row that is not a mapping.
+    - Each value of ``Outcome.row`` that is not a mapping.
     - Each field of the parameter sweep, by its dotted path.
     - The ending of each robot, for example ``<name>.cause``, if there are several.
     - Each metric.

@@ -213,8 +213,8 @@ def paired_median(
     """Compares the values (n,) of a metric between two methods on the same n layouts.
 
     NaN means that a run has no value. Only layouts with values of both methods count.
-    The p-value is that of the Wilcoxon signed-rank test.
-    The result is None if no layout has values of both methods.
+    The p-value is that of the Wilcoxon signed-rank test. The result is None if no
+    layout has values of both methods.
     """
     from scipy.stats import wilcoxon
 

@@ -261,10 +261,12 @@ class SweepPlan(Parameters):
     def _draw_run(
         self, run: int, cells: list[tuple[int, dict[str, Any]]], stream: list[int]
     ) -> list[SweepPoint]:
-        """Draws the run with this number in all ``cells``, which get the same draws.
+        """Draws one run in several cells, which all get the same draws.
 
-        The numbers in ``stream`` distinguish cells with different draws. Raises
-        InputError if all attempts give a scenario that is not valid.
+        The argument ``run`` is the number of the run, and ``cells`` contains the
+        number and the fields of each cell. The numbers in ``stream`` make the draws
+        differ from those of other cells. Raises InputError if no attempt gives a valid
+        scenario in all cells.
         """
         entropy = [self.seed, run, *stream]
         seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0] >> 1)
@@ -309,7 +311,8 @@ class SweepPlan(Parameters):
     def _draws(self, entropy: list[int]) -> Iterator[tuple[str, Any]]:
         """Draws the values of all fields in ``draw``; yields paths and values.
 
-        Each key has its own random numbers, independent of the other keys.
+        The numbers in ``entropy`` are the seed. The draws of one key do not depend on
+        the other keys.
         """
         for key, distribution in self.draw.items():
             words = [*entropy, crc32(key.encode())]

@@ -120,7 +120,7 @@ def estimate_rows(summary: Summary) -> list[list[str]]:
 
 
 def robot_rows(summary: Summary) -> list[list[str]]:
-    """Returns the rows of a table: a heading, then the metrics of each robot per cell.
+    """Returns the rows of a table: a heading, then one row per cell and robot.
 
     There are no rows if the scenario has only one robot.
     """

@@ -48,7 +48,7 @@ class SweepStore:
 
         If ``out`` is None, the directory is the next number under results/. The
         argument ``points`` contains all runs of the plan, sorted by their number.
-        Raises InputError if the directory contains something else than this sweep, or
+        Raises InputError if the directory contains anything but this sweep, or
         is in use. Raises InputError or StoreError if it cannot be written.
         """
         self._journal = -1

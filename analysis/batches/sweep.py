@@ -125,9 +125,10 @@ def prepare_sweep(
 
 
 def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
-    """Returns the shell command that repeats one run of the sweep in a directory.
+    """Returns the shell command that repeats one run of a sweep.
 
-    The engine is that of the run: ``drake`` or ``compiled``.
+    The argument ``out`` is the directory of the sweep, and ``engine`` is the engine of
+    the run: ``drake`` or ``compiled``.
     """
     words = ["phonotaxis", "simulate", str(out / "scenario.yaml")]
     for path, value in point.fields.items():

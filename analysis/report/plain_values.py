@@ -17,8 +17,9 @@ from pydantic import BaseModel
 def plain(value: Any) -> Any:
     """Converts a value to mappings, lists, texts, numbers, truth values and None.
 
-    The function converts the entries of mappings, lists and tuples, and these types. It
-    raises TypeError for any other type that JSON cannot represent.
+    The entries of mappings, lists and tuples are converted, too. The function converts
+    values of the types below. It raises TypeError for any other type that JSON cannot
+    represent.
 
     - An object with a method ``to_dict`` is replaced by the result of this method.
     - Any other dataclass becomes a mapping of its fields. Fields whose names begin with

@@ -109,10 +109,10 @@ def _resting_poses(
     commands: NDArray[np.float64],
     numbers: BrakingNumbers,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the (n, 3) poses at which the robot would rest if it braked from a tick.
+    """Computes for each tick the pose at which the robot would rest if it braked.
 
-    Poses are (x, y, theta), m and rad. The (n, 2) commands are the speeds of the left
-    and right wheel that the previous tick commanded, rad/s.
+    The poses (n, 3) are (x, y, theta), m and rad. The (n, 2) commands are the speeds of
+    the left and right wheel that the previous tick commanded, rad/s.
     """
     rests = np.empty(poses.shape)
     speeds, kept = (0.0, 0.0), numbers.part.kept**numbers.parts

@@ -82,10 +82,10 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def begin(self) -> int:
-        """First tick that counts, 0 for most runs.
+        """First tick that counts for the metrics of a search.
 
-        A search that waits for a call counts from the first tick at which the robot
-        listens to the sound of the caller.
+        If the robot waits for a call, this is the first tick at which it listens to the
+        sound of the caller. Otherwise, it is 0.
         """
         if not self.searches:
             return 0
@@ -337,7 +337,7 @@ def _cone_ranges(
 
 
 def near_and_after(clearance: ArrayLike, period_s: float) -> Flags:
-    """(n,) whether an obstacle is nearer than 1 m, or was nearer within the last 5 s.
+    """(n,) whether an obstacle is nearer than 1 m, or has been within the last 5 s.
 
     The argument ``clearance`` (n,) is that of the nearest obstacle, m. The samples
     have intervals of ``period_s``, s.

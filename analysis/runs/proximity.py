@@ -67,8 +67,8 @@ class Proximity:
         - Between the two ticks, the robot and the fastest body together move farther
           than the clearance at one of these ticks.
 
-        Within these parts, the poses of all robots are interpolated. The other bodies
-        are at the exact poses of their paths.
+        At the additional times, the poses of robots are interpolated. The other bodies
+        have the exact poses of their paths.
         """
         clearance, least = self._clearances
         gone = np.hypot(*np.diff(self.robot[:, :2], axis=0).T)

@@ -72,7 +72,7 @@ class RecordedRun:
     def robots(self) -> dict[str, Mapping[str, NDArray[np.float64]]]:
         """Columns of each robot, by name of the robot.
 
-        The value is a mapping from names of columns to (n,) arrays. The names do not
+        Each value is a mapping from names of columns to (n,) arrays. The names do not
         begin with the name of the robot.
         """
         names = list(self.scenario.robots)

@@ -28,9 +28,10 @@ PADDING = 4
 def jerk(velocity: ArrayLike, period: float) -> Floats:
     """Computes the jerk of a velocity (n,) or (n, k) as its second derivative.
 
-    The function fits a cubic polynomial to the velocity over 0.25 s by least squares (a
-    Savitzky-Golay filter). The fit hardly changes the jerk of a slow motion. The jerk
-    of a sine is too low: by 5 % at 1 Hz, by 19 % at 2 Hz, and by 79 % at 5 Hz.
+    The samples have intervals of ``period``, s. The function fits a cubic polynomial to
+    the velocity over 0.25 s by least squares (a Savitzky-Golay filter). The fit hardly
+    changes the jerk of a slow motion. The jerk of a sine is too low: by 5 % at 1 Hz, by
+    19 % at 2 Hz, and by 79 % at 5 Hz.
 
     The result (m,) or (m, k) contains only samples with a complete fitting window. At a
     period of 25 ms, m is n - 10. If no window is complete, the result is empty.
@@ -62,10 +63,10 @@ def _second_derivative(half: int) -> Floats:
 def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> Floats:
     """Computes the spectral arc lengths (SPARC) of speeds (..., n), dimensionless.
 
-    The function computes the magnitude spectrum of the speed. It scales the spectrum so
-    that the largest magnitude and the range of frequencies are 1. The result is minus
-    the length of this curve (Balasubramanian et al. 2012, 2015). A less smooth motion
-    has a more negative value.
+    The last axis is time. The function computes the magnitude spectrum of the speed. It
+    scales the spectrum so that the largest magnitude and the range of frequencies are
+    1. The result is minus the length of this curve (Balasubramanian et al. 2012, 2015).
+    A less smooth motion has a more negative value.
 
     A motion must last a few seconds, and must not be at rest all the time. Divide a
     longer motion with ``windows``.
@@ -96,12 +97,12 @@ def _arc_lengths(
 
 
 def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> Floats:
-    """Computes the log dimensionless jerk (LDLJ) of speeds (..., n), for smoothness.
+    """Computes the log dimensionless jerk (LDLJ) of speeds (..., n), dimensionless.
 
-    The value is -ln(T^3 / v_peak^2 * J). T is the duration, v_peak is the largest
-    speed, and J is the integral of the squared second derivative of the speed.
-    Derivatives are plain differences (Balasubramanian et al. 2015). A less smooth
-    motion has a more negative value.
+    The last axis is time. The value is -ln(T^3 / v_peak^2 * J). T is the duration,
+    v_peak is the largest speed, and J is the integral of the squared second derivative
+    of the speed. Derivatives are plain differences (Balasubramanian et al. 2015). A
+    less smooth motion has a more negative value.
 
     The speed must not be constant or linear over all n samples, because J is then 0.
     """

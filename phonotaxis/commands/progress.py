@@ -48,8 +48,9 @@ class Progress:
         """Shows how much work is done.
 
         Args:
-            done: Amount of finished work, in the unit of the bar; or the name of the
-                next step. The bar then counts steps.
+            done: Either the amount of finished work, in the unit of the bar, or the
+                name of the step that begins now. With names, the bar shows the number
+                of finished steps.
 
         Raises:
             KeyboardInterrupt: An interrupt came since the last call.
