@@ -73,7 +73,7 @@ class _Parser(argparse.ArgumentParser):
     """Parser that raises an exception for wrong words and suggests similar words."""
 
     def print_help(self, file: Any = None) -> None:
-        # The method of argparse hides errors of standard output.
+        # The method of argparse ignores errors when it writes to standard output.
         (file or sys.stdout).write(self.format_help())
 
     #: Parsers of the subcommands, by name.
@@ -103,7 +103,8 @@ class _Parser(argparse.ArgumentParser):
             from diagrams.scenario.suggestions import did_you_mean
 
             options = {name: _options(parser) for name, parser in self.below.items()}
-            # The names have no dashes, which would make all options look similar.
+            # The names are compared without dashes, which would make all of them
+            # similar.
             hint = did_you_mean(option[1], options[command]).replace("'", "'--", 1)
             others = [name for name, own in options.items() if option[1] in own]
             if others and not hint:
@@ -154,7 +155,7 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
         if unknown:
             parser.refuse(options.command, unknown)
         carry_out(COMMANDS[options.command], options, interrupts)
-    except BrokenPipeError:  # the reader of our output has left
+    except BrokenPipeError:  # the program that reads our output has ended
         return FAILED
     except Exception as error:  # noqa: BLE001  # bad input, a failed run, or a bug
         return _report(error, words)
@@ -164,7 +165,7 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
 
 
 def _drop_unwritable() -> None:
-    """Drops output that cannot be written, to avoid an error at Python's exit."""
+    """Discards output that cannot be written. Python's exit would write it again."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -1,4 +1,4 @@
-"""Commands that list what there is: scenarios, laws, fields, columns, installation."""
+"""Commands that list scenarios, laws, fields or columns, or check the installation."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _laws(options: Namespace, take: Take) -> Prepared[Printed]:
 
 
 def _listing(plural: str, about: str, rows: Mapping[str, str]) -> Prepared[Printed]:
-    """Lists names, each with one line of text; the words are keys of the document."""
+    """Lists names, each with a line of text; the first two arguments are JSON keys."""
     from analysis.report.provenance import SCHEMA_VERSION
 
     width = max(map(len, rows))
@@ -97,7 +97,7 @@ def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
 
 
 def _paragraph(field: Field) -> str:
-    """Describes a field: a line with the values for ``--set``, then the meaning."""
+    """Describes a field: a line with path, default, type, and range; the meaning."""
     unit = f" {field.unit}" if field.unit else ""
     has_no_default = field.default is None and field.kind == "group"
     default = "" if has_no_default else f" = {json.dumps(field.default)}{unit}"
