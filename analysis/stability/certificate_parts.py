@@ -97,7 +97,6 @@ CERTIFIED_STARTS = Part[CertifiedStarts](
         ("A certificate is about the point P only: another part of the body may still "
         "touch something."),
     ),
-    fresh=True,
 )  # fmt: skip
 
 

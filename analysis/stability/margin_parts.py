@@ -303,7 +303,6 @@ MARGINS = Part[Margins](
     ),
     document=_document,
     models=lambda data: (data.target_model,),
-    fresh=True,
 )  # fmt: skip
 
 
