@@ -131,8 +131,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a command of the command line.
 
     Args:
-        arguments: Words after the name of the program. None means the words of this
-            process, which must then end after the command.
+        arguments: Words after the name of the program. None means the words with which
+            this process was started. The process must then end after the command,
+            because it ignores interrupts from then on.
 
     Returns:
         Exit status: 0 if the command succeeded, 2 if the input is not valid, 1 after
@@ -149,8 +150,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             words = sys.argv[1:] if arguments is None else arguments
             status = run_words(list(words), interrupts)
             if arguments is None:
-                # The results are written. Text that a user's module prints at exit is
-                # not a result and goes to standard error.
+                # The result has been printed. Text that a user's module prints at exit
+                # does not belong to the result, and goes to standard error.
                 sys.stdout = sys.stderr
             return status
     except KeyboardInterrupt:

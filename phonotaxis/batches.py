@@ -45,7 +45,7 @@ class BatchResult(Result):
         return self.batch.out
 
     def document(self) -> dict[str, Any]:
-        """Returns the JSON document of the command."""
+        """Returns the JSON document of the command ``sweep`` or ``compare``."""
         return batch_document(self.batch)
 
     def __str__(self) -> str:
@@ -54,7 +54,7 @@ class BatchResult(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Number of runs with each warning."""
+        """One line per warning, with the number of runs that it affects."""
         every = self.batch.summaries.values()
         return tuple(line for each in every for line in warning_lines(each))
 
@@ -85,7 +85,7 @@ class BatchResult(Result):
             directory: New or empty directory for the copy. None means no copy.
 
         Returns:
-            Path of the copy, or ``out``.
+            Path of the copy; without a copy, ``out``.
 
         Raises:
             InputError: The directory is in use, or cannot be created or written.
@@ -129,7 +129,7 @@ class ComparisonResult(BatchResult):
 
     @property
     def pooled(self) -> list[Pair]:
-        """Pairs of values of a field, over all scenarios together."""
+        """Comparisons of two values of a field over the runs of all scenarios."""
         return self.batch.pooled
 
     def __repr__(self) -> str:
@@ -159,7 +159,8 @@ def sweep(
         progress: Function that is called with the number of finished runs.
 
     Returns:
-        Table of the runs. The directory contains it, and an HTML page.
+        Result with the table of the runs. The directory contains the table, too, and an
+        HTML page.
 
     Raises:
         InputError: An argument or the plan is not valid. The message states the fault
@@ -213,7 +214,7 @@ def compare(
             driving without avoidance. For a scenario with routes, None means the laws
             for routes.
         runs: Number of layouts per scenario. Every law meets each layout.
-        seed: Seed of the layouts and the noise.
+        seed: Seed of the layouts and of the noise.
         settings: Values of other fields of the scenarios, by dotted path.
         grid: Lists of values of other fields to compare, by dotted path.
         out: New or empty directory. None means the next number under ``results``.
@@ -223,8 +224,8 @@ def compare(
         progress: Function that is called with the number of finished runs.
 
     Returns:
-        Rates, medians and pairs of laws. The directory also contains them, with
-        pictures.
+        Result with rates and medians for each law, and with comparisons of two laws
+        each. The directory contains them, too, with pictures.
 
     Raises:
         InputError: An argument is not valid. The message states the fault and the

@@ -41,7 +41,7 @@ class StabilityResult(Result):
     """Stability of a scenario's control loop, under one law or several laws."""
 
     analyses: list[LawAnalysis]
-    """Analysis of each law."""
+    """One analysis per law."""
     robots_left_out: str = ""
     """Note that names the robots that are not analyzed; empty if there are none."""
 
@@ -93,7 +93,7 @@ class StabilityResult(Result):
         return found[0].to_control()
 
     def failure(self, out: Path | None) -> RunError | None:
-        """Returns an error that names the parts with a fault of the program."""
+        """Returns an error if faults of the program made parts of the report fail."""
         failures = [each for one in self.analyses for each in one.failures.items()]
         if not failures:
             return None
@@ -121,7 +121,10 @@ class StabilityResult(Result):
 
 @dataclass(frozen=True, repr=False)
 class DesignResult(Result):
-    """Gains of the laws for a scenario, and a recommended attraction."""
+    """Gains of the laws for a scenario, and a recommended attraction.
+
+    The attraction is the virtual spring and damper that pull the robot to its target.
+    """
 
     study: DesignStudy
 
@@ -162,8 +165,9 @@ def stability(
 ) -> StabilityResult:
     """Analyzes the stability of a scenario's control loop.
 
-    If the scenario has several robots, only one robot is analyzed. A warning of the
-    logger ``phonotaxis``, and ``notes`` of the result, name the other robots.
+    If the scenario has several robots, only one robot is analyzed. The logger
+    ``phonotaxis`` then warns with the names of the other robots. The attribute
+    ``notes`` of the result also names them.
 
     Args:
         scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
@@ -172,15 +176,15 @@ def stability(
             commas. ``all`` means all laws that avoid obstacles, or all laws for routes.
             An empty list means the law of the scenario.
         robot: Name of the robot to analyze. None means the first robot.
-        full: Whether to check by longer simulations, and by more of them.
-        progress: Function that is called with the name of each part before its
-            computation.
+        full: Whether to check the analysis by more and longer simulations.
         settings: Fields of the scenario to change, as for ``load_scenario``.
+        progress: Function that is called before the computation of each part of the
+            report, with the name of this part.
         **fields: Further fields of the scenario to change. They override ``settings``.
             ``law`` has the meaning of ``laws``.
 
     Returns:
-        Data of every part, and the verdicts on the stability.
+        Data of all parts of the report, and the verdicts on the stability.
 
     Raises:
         InputError: The law or the robot does not exist, or the robot has no linear
@@ -199,12 +203,12 @@ def prepare_stability(
     """Checks the laws of a stability report; see ``stability``.
 
     Args:
-        scenarios: Scenario of one robot, with each law.
-        note: Note that names the robots that are left out; empty if there are none.
-        full: Whether to check by longer simulations, and by more of them.
+        scenarios: The same scenario of one robot with each of the laws.
+        note: Note that names the robots that are not analyzed; empty if there are none.
+        full: Whether to check the analysis by more and longer simulations.
 
     Returns:
-        The work, which returns the report.
+        The work, which returns the result of ``stability``.
     """
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)
@@ -229,8 +233,9 @@ def design(
 ) -> DesignResult:
     """Derives gains of the laws from stated requirements.
 
-    The gains fit the attraction of the scenario. The result also recommends another
-    attraction, as the stability report does, with gains of the laws for it.
+    The attraction is the virtual spring and damper that pull the robot to its target.
+    The function computes gains for the attraction of the scenario. It also recommends
+    another attraction, and computes gains for this one.
 
     Args:
         scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
@@ -240,7 +245,7 @@ def design(
         **fields: Further fields of the scenario to change. They override ``settings``.
 
     Returns:
-        Gains and figures of both attractions.
+        For both attractions, the gains and the resulting performance.
 
     Raises:
         InputError: The scenario is not valid or has several robots, or no gains meet a

@@ -1,4 +1,4 @@
-"""The shape of all results, and of work that is ready to start."""
+"""Base classes of all results, and the class of work that is ready to start."""
 
 from __future__ import annotations
 
@@ -26,19 +26,20 @@ class Output(ABC):
         """Returns the text that the command prints, without a final newline."""
 
     def failure(self, out: Path | None) -> Exception | None:
-        """Returns why the command fails although it has a result.
+        """Returns an exception if the command fails although it has a result.
 
         Args:
             out: Directory that contains the files; None if there are no files.
 
         Returns:
-            The exception, whose message the command prints; None if it succeeds.
+            The exception, whose message the command prints. None if the command
+            succeeds.
         """
         return None
 
 
 class Result(Output):
-    """Result of a public function."""
+    """Result of a public function, and of the command with the same name."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -56,7 +57,7 @@ class Result(Output):
 
     @abstractmethod
     def write(self, document: dict[str, Any], directory: Path) -> None:
-        """Writes the files of the command into an existing directory.
+        """Writes the files of the result into an existing directory.
 
         Args:
             document: The JSON document, with the key ``out``.
@@ -64,7 +65,7 @@ class Result(Output):
         """
 
     def save(self, directory: str | Path | None = None) -> Path:
-        """Writes all files of the command into a new directory.
+        """Writes the files of the result into a new directory.
 
         Args:
             directory: New or empty directory. None means the next number under
@@ -91,18 +92,18 @@ class Prepared(Generic[Output_co]):
     """Work whose input has been checked, and which can be done once."""
 
     run: Callable[[Callable[[Any], None]], Output_co]
-    """Does the work. The argument is a function that is called with the amount of
-    finished work in ``unit``, or with the name of the next step. If it raises an
-    exception, the work ends."""
+    """Does the work. The argument is a function that ``run`` calls during the work:
+    with the amount of finished work in ``unit``, or with the name of the next step. If
+    this function raises an exception, the work ends."""
     total: float = 0.0
     """Total amount of work; 0 if ``run`` does not report its progress."""
     unit: str = ""
     """Unit of the work, for example runs."""
     done: float = 0.0
-    """Amount of work that was done before."""
+    """Amount of work that earlier runs of the command have already done."""
     left: Callable[[], str] = str
-    """Describes the files that remain after an interrupt; empty if there are none."""
+    """Returns a text about files that remain after an interrupt; it can be empty."""
 
 
 def ignore(done: Any) -> None:
-    """Reports no progress."""
+    """Does nothing; stands for a missing ``progress`` function."""

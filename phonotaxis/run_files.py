@@ -1,4 +1,4 @@
-"""Files that a run writes besides its results: its sound, and a movie."""
+"""Files that a run can write outside of its result directory: sound, and a movie."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ MCAP_FILE, CSV_FILE = "run.mcap", "trajectory.csv"
 class SavedAudio:
     """The sound files of a run, and how much sound has been written.
 
-    The sound is written directly into its final directory. A result directory, in
-    contrast, appears only when it is complete. If an interrupt or a full disk ends the
-    run, the sound up to this time remains and can be read.
+    During the run, the sound is written directly into its final directory. If an
+    interrupt or a full disk ends the run, the sound up to this time remains and can be
+    read. A result directory, in contrast, appears only when it is complete.
 
     Args:
         directory: New or empty directory for the sound files.
@@ -64,12 +64,12 @@ class SavedAudio:
 
     @property
     def heard(self) -> Path:
-        """File of the sound at the first listening robot; complete after the run."""
+        """File of the sound at the first robot that listens; complete after the run."""
         assert self._files is not None
         return self._files.first_heard
 
     def left(self) -> str:
-        """Says what sound remains after an interrupt; an empty text if none remains."""
+        """Returns a text about sound that remains after an interrupt, if any."""
         if self._files is None or self._files.until_s == 0.0:
             return ""
         return f"the sound until {self._files.until_s:g} s is in {self._shown}"
@@ -109,8 +109,8 @@ class SavedMovie:
         """Provides the sound files for the movie.
 
         Args:
-            saved: Sound files that the user also wants, or None. Without them, the
-                sound is in a hidden directory beside the movie.
+            saved: Sound files that the user wants to keep. If None, the sound is in a
+                hidden directory beside the movie during the ``with`` block.
 
         Yields:
             The sound files, or None if the movie is silent and ``saved`` is None.
@@ -150,7 +150,7 @@ class SavedMovie:
 
 @contextmanager
 def _naming_option() -> Iterator[None]:
-    """Makes errors about a directory name the option ``--save-audio``."""
+    """Assigns errors within the block to the option ``--save-audio``."""
     from systems.framework.input_error import InputError
 
     try:

@@ -38,7 +38,7 @@ class RunResult(diagrams.RunResult, Result):
 
     @classmethod
     def of(cls, result: diagrams.RunResult) -> RunResult:
-        """Converts a result of ``diagrams``, including the results of each robot."""
+        """Converts a result of ``diagrams.simulate``, also for each robot."""
         values = {each.name: getattr(result, each.name) for each in fields(result)}
         values["several"] = {name: cls.of(own) for name, own in result.several.items()}
         return cls(**values)
@@ -71,7 +71,7 @@ class RunResult(diagrams.RunResult, Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Assumptions that the scenario breaks, each in one line."""
+        """Warnings about the scenario, each in one line."""
         return tuple(str(each) for each in self.warnings)
 
     @property
@@ -91,8 +91,8 @@ class RunResult(diagrams.RunResult, Result):
             The figure. Its method ``savefig`` writes the figure to a file.
 
         Raises:
-            InputError: ``what`` is unknown. Or ``what`` is ``time_series`` and the run
-                has several robots. Each robot then has time series of its own.
+            InputError: ``what`` is unknown, or it is ``time_series`` and the run has
+                several robots. Draw the time series of each of ``robots`` instead.
         """
         from analysis.runs.proximity import Proximity
         from analysis.views.picture import plot_trajectory
@@ -149,8 +149,8 @@ class RunResult(diagrams.RunResult, Result):
     def to_csv(self, path: str | Path) -> Path:
         """Writes the table ``trajectory`` as a CSV file.
 
-        The file has one row per tick (tick = control period). Its numbers have all
-        digits, so that reading the file gives the same numbers.
+        The file has one row per tick (control period). All digits are written, so that
+        reading the file gives exactly the same numbers.
 
         Args:
             path: The .csv file.
@@ -221,8 +221,9 @@ def simulate(
 
     Example: ``simulate("default", law="active", duration_s=20)``.
 
-    A warning of the logger ``phonotaxis`` states each assumption that the scenario
-    breaks. ``notes`` of the result contains the same texts.
+    The logger ``phonotaxis`` states warnings about the scenario, for example if the
+    robot cannot come to rest with its gains. The attribute ``notes`` of the result
+    contains the same texts.
 
     Args:
         scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
@@ -233,8 +234,8 @@ def simulate(
             faster than with Drake. None means the engine of the scenario.
         progress: Function that is called once per simulated second with the simulated
             time in seconds.
-        audio: Open files for the sound that the robot hears and plays. None means that
-            ``save_audio`` decides.
+        audio: Open files for the sound that robots hear and loudspeakers play. They are
+            not used if ``save_audio`` is given or the movie has sound.
         save_audio: New or empty directory for the sound that robots hear and
             loudspeakers play. None means that no sound is saved.
         movie: New .gif or .mp4 file for a movie of the run from above. None means no
@@ -272,10 +273,10 @@ def prepare_simulation(
 
     Args:
         scenario: Scenario of the run.
-        engine: Engine of the run; None means that of the scenario.
-        audio: Open files for the sound; None means those of ``saved``.
-        saved: Directory for the sound of the run.
-        movie: Movie of the run.
+        engine: Engine of the run; None means the engine of the scenario.
+        audio: Open files for the sound, see ``simulate``.
+        saved: Sound files that the run writes, or None.
+        movie: Movie that the run writes, or None.
 
     Returns:
         The work, which returns the result of the run.

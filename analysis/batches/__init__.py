@@ -1,1 +1,1 @@
-"""Sweeps: many runs of variants of a scenario, in many processes, into one table."""
+"""Sweeps and comparisons: many runs of variants of a scenario, and their results."""

@@ -1,4 +1,8 @@
-"""A batch: one sweep, or a comparison of laws as one paired sweep per scenario."""
+"""Batches: sweeps, and comparisons of control laws.
+
+A sweep runs many variants of one scenario. A comparison consists of one sweep per
+scenario, in which every law meets the same random layouts.
+"""
 
 from __future__ import annotations
 
@@ -20,24 +24,26 @@ from analysis.report.file_names import distinct_names
 from analysis.report.result_directory import ResultDirectory, take_directory
 from diagrams.scenario.scenario import scenario_from_mapping
 
-#: Names in the directory of a batch. The directory of a comparison also contains a
-#: folder for each scenario.
+#: Names of two files and a folder in the directory of a batch. The directory of a
+#: comparison also contains a folder for each scenario.
 SUMMARY, REPORT, EXAMPLES = "summary.json", "report.html", "examples"
-#: Greatest number of cells for which a report compares pairs and shows example runs.
+#: Greatest number of cells for which a report compares pairs and shows example runs. A
+#: cell is one combination of the values in the grid of a sweep.
 MOST_CELLS = 24
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The runs of one scenario, and what they show."""
+    """The runs of one scenario, and their evaluation."""
 
     name: str
     plan: SweepPlan
     rows: pd.DataFrame
-    """Table of the runs, with the metrics of all robots together."""
+    """Table with one row per run. If there are several robots, the table also contains
+    the metrics over all robots."""
     cells: list[Cell]
     pairs: list[Pair]
-    """Pairs of cells; empty if the sweep does not compare laws."""
+    """Comparisons of two cells each; empty if the sweep does not compare laws."""
 
     @property
     def robots(self) -> list[str]:
@@ -47,14 +53,23 @@ class Summary:
 
 
 def compares_laws(plan: SweepPlan) -> bool:
-    """Whether laws meet the same layouts in a sweep of at most 24 cells."""
+    """Returns whether a sweep of at most 24 cells compares laws on the same layouts."""
     return plan.pair and "law" in plan.grid and plan.cell_count <= MOST_CELLS
 
 
 def summarize(plan: SweepPlan, table: pd.DataFrame, name: str) -> Summary:
-    """Summarizes the results of a sweep, as ``load_results`` returns them."""
+    """Summarizes the runs of a sweep.
+
+    Args:
+        plan: Plan of the sweep.
+        table: Table of the runs, from ``load_results``.
+        name: Name of the scenario.
+
+    Returns:
+        The runs, with an evaluation of each cell and of each pair of cells.
+    """
     scenario = scenario_from_mapping(plan.base)
-    if "tick_s" not in table:  # else it is swept or drawn
+    if "tick_s" not in table:  # otherwise, the sweep varies it
         table = table.assign(tick_s=scenario.tick_s)
     rows = with_all_robots(table, list(scenario.robots)).sort_values("index")
     cells = [
@@ -76,7 +91,8 @@ class Batch:
     summaries: dict[str, Summary]
     """Results of each scenario, by the scenario's name."""
     pooled: list[Pair]
-    """Pairs of values of a field over all scenarios, and over all other fields."""
+    """Comparisons of two values of a field, for example of two laws. Each comparison
+    includes the runs of all scenarios, with all values of the other fields."""
 
     def require_runs(self) -> None:
         """Raises RunError if every run failed."""
@@ -90,8 +106,8 @@ class PreparedBatch:
     title: str
     out: Path
     sweeps: dict[str, PreparedSweep]
-    """Sweep of each scenario, by the scenario's name. The folder of a sweep has the
-    same name if the file system allows it."""
+    """Sweep of each scenario, by the scenario's name. In a comparison, each sweep has a
+    folder with this name, changed only if the file system requires it."""
 
     @property
     def runs(self) -> int:
@@ -104,10 +120,10 @@ class PreparedBatch:
         return sum(len(sweep.store.done) for sweep in self.sweeps.values())
 
     def run(self, progress: Callable[[int], None] | None = None) -> Batch:
-        """Does the runs, and summarizes the results of each scenario.
+        """Does the runs that are not done yet, and summarizes each scenario.
 
-        See ``PreparedSweep.run``; ``progress`` gets the number of finished runs of all
-        scenarios.
+        The function ``progress`` is called with the number of finished runs, over all
+        scenarios. For the errors, see ``PreparedSweep.run``.
         """
         summaries: dict[str, Summary] = {}
         before = 0
@@ -149,11 +165,11 @@ def prepare_comparison(
     workers: int | None = None,
     resume: bool = False,
 ) -> PreparedBatch:
-    """Draws all layouts of a comparison, checks them, and opens the result directories.
+    """Draws and checks all layouts of a comparison, and opens its directories.
 
-    A layout is one random variant of the positions and motions of all bodies. The plans
-    are those of ``comparison_plan``, by name of the scenario. For the other arguments,
-    see ``prepare_sweep``.
+    A layout is one random variant of the positions and motions of all bodies. The
+    argument ``plans`` maps the name of each scenario to its plan, which
+    ``comparison_plan`` makes. For the other arguments, see ``prepare_sweep``.
     """
     check_options(out, workers=workers, resume=resume)
     directory = Path(out).expanduser() if out is not None else None
@@ -175,6 +191,6 @@ def prepare_comparison(
             taken.undo(contents=True)
         raise
     if taken is not None:
-        taken.close()  # from now on the directories of the runs are locked
+        taken.close()  # from now on, each sweep locks its own directory
     title = f"Comparison of laws: {', '.join(plans)}"
     return PreparedBatch(title, directory, sweeps)

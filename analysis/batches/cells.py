@@ -1,4 +1,8 @@
-"""Cells of a sweep: rates, averages, and causes of failures of their runs."""
+"""Summarizes each cell of a sweep: rates, averages, and causes of failures.
+
+A cell consists of all runs with the same combination of values in the grid of the
+sweep.
+"""
 
 from __future__ import annotations
 
@@ -31,11 +35,12 @@ from diagrams.running.stop_rules import SUCCESSFUL
 
 ExampleKind = Literal["worst", "typical", "best"]
 EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
-#: MOST_BINS: greatest number of bins of a drawn number.
+#: Bins into which ``marginal`` sorts the runs by the value of a drawn number.
+#: MOST_BINS: greatest number of bins.
 #: LEAST_RUNS: least number of runs per bin, if there is more than one bin.
 MOST_BINS, LEAST_RUNS = 8, 20
-#: A body was out of sight if the time from its last echo to the contact is at least
-#: this number of ticks. Then there was no echo at the last tick.
+#: A body was out of sight if its last echo came at least this number of ticks (control
+#: periods) before the contact. The last tick before the contact then had no echo of it.
 OUT_OF_SIGHT_TICKS = 1.5
 #: A body was heard late if its first echo came less than this time before the contact,
 #: s. At the top speed of 0.72 m/s, the robot travels 0.72 m in this time.
@@ -51,7 +56,7 @@ class Quantity:
     name: str
     """``success``, ``collision``, or the column of a metric."""
     seed: int = 0
-    """Seed of the sweep, for bootstrap intervals."""
+    """Seed of the sweep. It determines the bootstrap interval of a mean."""
 
     @property
     def rate(self) -> bool:
@@ -66,9 +71,9 @@ class Quantity:
     def estimate(self, runs: pd.DataFrame) -> Estimate:
         """Estimates the quantity.
 
-        A rate is the share of all runs. A run that raised an error counts as a run
-        without success and without collision. ``METRICS`` defines which runs an average
-        of a metric includes.
+        A rate is the number of runs with success, or with a collision, divided by the
+        number of all runs. A run that raised an error has neither. The average of a
+        metric includes the runs that ``Metric.of`` states.
         """
         if self.rate:
             hits = successes if self.name == "success" else collisions
@@ -87,8 +92,8 @@ class Quantity:
     def text(self, estimate: Estimate, sign: str = "") -> str:
         """Writes an estimate in the form '82 (68, 91)', with rates in percent.
 
-        With the sign ``+``, positive numbers have a sign, too. Without runs, the text
-        is a dash.
+        If ``sign`` is ``+``, positive numbers begin with a plus sign. If the estimate
+        has no samples, the text is a dash.
         """
         if self.rate:
             return estimate.text(f"{sign}.0f", factor=100.0)
@@ -99,10 +104,18 @@ class Quantity:
 def quantities(
     rows: pd.DataFrame, *, pictures: bool = False, robot: str = "", seed: int = 0
 ) -> list[Quantity]:
-    """Returns the rates and metrics that pages show, without those that no run has.
+    """Returns the rates and metrics that pages show; omits metrics without any value.
 
-    With the name of a robot, the result contains the metrics of this robot and no
-    rates. Otherwise, it contains the rates and the metrics of all robots together.
+    Args:
+        rows: Table of the runs.
+        pictures: Whether to omit the metrics that only tables show.
+        robot: Name of one of several robots. The result then contains only the metrics
+            of this robot. An empty name means the rates, and the metrics over all
+            robots.
+        seed: Seed of the sweep.
+
+    Returns:
+        The rates, then the metrics in the order of ``METRICS``.
     """
     prefix = f"{robot}." if robot else ""
     names = [
@@ -120,7 +133,8 @@ class ExampleRun:
     """A run of a cell that the report shows as an example."""
 
     kind: ExampleKind
-    """Position among the cell's runs, ordered by success and then by clearance."""
+    """Rank among the runs of the cell. A failed run ranks below a successful run. If
+    both failed or both succeeded, the run with less clearance ranks lower."""
     index: int
     """Number of the run in the sweep."""
     cause: str
@@ -128,22 +142,22 @@ class ExampleRun:
 
 @dataclass(frozen=True)
 class Cell:
-    """Summary of all runs of one scenario with the same values of the grid."""
+    """Summary of all runs of one scenario in one cell."""
 
     scenario: str
     fields: dict[str, Any]
-    """Values of the fields of the grid, by dotted path."""
+    """Values that the fields of the grid have in this cell, by dotted path."""
     runs: int
     causes: dict[str, int]
-    """Number of runs by cause of their end. The cause of a collision states in
-    brackets who was at fault."""
+    """Number of runs that ended by each cause. The cause of a collision also names who
+    was at fault: ``collision (robot)`` or ``collision (obstacle)``."""
     mechanisms: dict[str, int]
-    """Number of failed runs by mechanism; see ``failure_mechanisms``. It is empty for
-    several robots, and for a robot without range sensors."""
+    """Number of failed runs by mechanism; see ``failure_mechanisms``. The mapping is
+    empty for several robots, and for a robot without range sensors."""
     success: Estimate
     collision: Estimate
     metrics: dict[str, Estimate]
-    """Average of each metric, by column of the results."""
+    """Average of each metric, by its column in the table of the runs."""
     examples: tuple[ExampleRun, ...]
     warnings: list[WarningCount]
 
@@ -156,7 +170,10 @@ class Cell:
 def make_cell(
     scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int = 0
 ) -> Cell:
-    """Summarizes the runs of a cell. Their rows need the control period ``tick_s``."""
+    """Summarizes the runs of a cell.
+
+    The table ``rows`` must have a column ``tick_s``, the control period in s.
+    """
     metrics = {
         name: estimate
         for name in rows.columns
@@ -178,7 +195,7 @@ def make_cell(
 
 
 def _examples(rows: pd.DataFrame) -> tuple[ExampleRun, ...]:
-    """Worst, typical and best run, ordered by success and then by clearance."""
+    """Returns the worst, the median and the best run, ranked as in ``ExampleRun``."""
     clearance = column(rows, "minimum_clearance_m")
     order = np.lexsort((clearance, successes(rows)))
     # A run that raised an error has no clearance and cannot be shown.
@@ -211,26 +228,27 @@ def _mechanisms(rows: pd.DataFrame) -> dict[str, int]:
 
 
 def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
-    """Names the mechanism by which each failed run failed; none for a success.
+    """Returns why each run failed; NaN for a successful run.
 
-    The rows are results of runs with range sensors, with the control period ``tick_s``
-    as an additional column.
+    The table ``rows`` contains runs of one robot with range sensors. An additional
+    column ``tick_s`` contains the control period in s.
 
-    The mechanism of a collision depends on the echoes of the body that the robot hit
+    The reason for a collision depends on the echoes of the body that the robot hit
     (docs/results_laws.md):
 
-    - ``never heard``: The body returned no echo. It came from a direction outside the
-      sensor cones.
-    - ``out of sight``: The body returned echoes, but none at the last tick before the
-      contact (tick = control period). The body had left the cones.
+    - ``never heard``: The body never caused an echo, because it was never inside the
+      cone of a sensor.
+    - ``out of sight``: The body caused echoes, but none at the last tick (control
+      period) before the contact. The body had left the cones.
     - ``heard late``: The first echo came less than 1 s before the contact.
-    - ``pushed too little``: The body returned echoes in time and up to the contact.
+    - ``pushed too little``: The first echo came in time, and the echoes lasted until
+      the contact. But the law did not push the robot away far enough.
 
-    The other failures have these mechanisms:
+    The reasons for the other failures are:
 
     - ``jam``: The robot never reached the goal. It got stuck, or the time ran out.
-    - ``held off``: The robot reached the goal and got stuck later. The repulsion from
-      the source itself kept the robot outside.
+    - ``held off``: The robot reached the goal, but got stuck outside of it later. The
+      law had pushed the robot away from the source itself.
     - ``swings``: The robot reached the goal but did not come to rest there.
     - ``lost``: The robot lost the source.
     - ``astray``: The robot did not follow the moving source for long enough.
@@ -257,10 +275,12 @@ class Marginal:
     """Estimates of a quantity as a function of one drawn field."""
 
     path: str
+    """Dotted path of the field."""
     places: NDArray[np.float64]
-    """Median of the field in each bin; for choices, their indices from 0."""
+    """Position of each bin on the axis of a plot: the median of the field in this bin.
+    If the field is not a number, the positions are 0, 1, 2 and so on."""
     labels: tuple[str, ...]
-    """Names of the choices; empty if the field is a number."""
+    """Name of the value in each bin; empty if the field is a number."""
     estimates: tuple[Estimate, ...]
     """Estimate of the quantity in each bin."""
 
@@ -271,9 +291,11 @@ def marginal(
     """Estimates a quantity as a function of one randomly drawn field.
 
     The runs are sorted into bins by the value of the field. If the field is a number,
-    the bins have about the same number of runs. Otherwise, each possible value has a
-    bin. If the key in ``plan.draw`` lists several paths, the first path represents all
-    of them.
+    the bins have about the same number of runs. Otherwise, each value that occurs has a
+    bin.
+
+    The argument ``key`` is a key of ``plan.draw``. If it lists several paths, the
+    function uses the field at the first path.
     """
     path = key.partition(",")[0].strip()
     values = runs[path]
@@ -297,24 +319,27 @@ def marginal(
 
 
 def by_cell(plan: SweepPlan, results: pd.DataFrame) -> list[pd.DataFrame]:
-    """Splits the runs of a sweep by the cells of its grid, as in ``plan.cells()``."""
+    """Returns one table of runs per cell, in the order of ``plan.cells()``."""
     return [results[results["cell"] == k] for k in range(plan.cell_count)]
 
 
 def cell_label(fields: dict[str, Any]) -> str:
-    """Describes a cell by the last part of each path and its value."""
+    """Returns a text about a cell, for example ``law active, speed_m_s 0.2``."""
     pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
     return ", ".join(pairs) or "all runs"
 
 
 def short(value: Any, most: int = 24) -> str:
-    """Writes a plain value in at most ``most`` characters; dots replace the end."""
+    """Writes a value with at most ``most`` characters; dots replace its end.
+
+    The value must be one that JSON can represent.
+    """
     text = value if isinstance(value, str) else json.dumps(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a table for a terminal, with two spaces between the columns."""
+    """Returns the lines of a table for a terminal, with two spaces between columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()

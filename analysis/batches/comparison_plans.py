@@ -1,4 +1,4 @@
-"""Plans of comparisons: the layouts, the laws and the other fields to compare."""
+"""Plans of comparisons: which laws and other fields to compare on which layouts."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ EXPERIMENTS = (
 )
 VELOCITY_TERM = "collision_vector.velocity_term"
 _LIBRARY = Path(diagrams.__file__).parent / "layouts"
-#: Fields of a sweep file that a comparison sets. Files of layouts must not set them.
+#: Fields of a sweep file that a comparison sets itself. A file of layouts, which is a
+#: sweep file otherwise, must not contain them.
 _OURS = ("grid", "runs", "pair")
 
 
 def library_layouts() -> dict[str, Path]:
-    """Returns the files of the layouts that come with the package, by name."""
+    """Returns the files of layouts that come with the package, by name."""
     return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
 
 
@@ -48,17 +49,26 @@ def comparison_plan(
     """Plans the runs that compare control laws on the layouts of one scenario.
 
     A layout is one variant of the positions and motions of all bodies. Every law meets
-    the same layouts with the same seeds. The other arguments are fields of
-    ``SweepPlan``.
+    the same layouts with the same seeds. In each run, all robots have the same law.
 
-    - A library name selects layouts of the library.
-    - A YAML file of layouts is a sweep file without ``grid``, ``runs`` and ``pair``.
-    - A YAML file of a scenario has a single layout, and its runs differ only in their
-      random numbers.
+    Args:
+        scenario: Name of layouts in the library, a YAML file of layouts, or a scenario
+            (a name in the library or a YAML file). A file of layouts is a sweep file
+            without ``grid``, ``runs`` and ``pair``. A scenario has a single layout, and
+            its runs differ only in their random numbers.
+        laws: Names of the laws. ``all`` means every law for robots of this kind. None
+            means the laws of the papers and driving without avoidance. For a scenario
+            with routes, None means the laws for routes.
+        runs: Number of layouts.
+        seed: Seed of the layouts and of the noise.
+        settings: Values of other fields, by dotted path.
+        grid: Lists of values of other fields to compare, by dotted path.
 
-    Each run uses one law for all robots. By default, the laws are those of the papers
-    and driving without avoidance; for a scenario with routes, they are the laws for
-    routes. ``all`` means every law for robots of this kind.
+    Returns:
+        Plan of a paired sweep over the laws and over ``grid``.
+
+    Raises:
+        InputError: An argument or a file is not valid.
     """
     plan = _layouts(scenario)
     base = scenario_from_mapping(plan.base)
@@ -71,7 +81,7 @@ def comparison_plan(
     names = law_names(laws)
     names = [law for name in names for law in (every if name == "all" else [name])]
     for key, values in (grid or {}).items():
-        if isinstance(values, str):  # it would be read letter by letter
+        if isinstance(values, str):  # it would become a list of its letters
             raise InputError(f"grid.{key}", f"is {values!r}; give a list of values")
     fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
     fields |= {
@@ -118,13 +128,24 @@ def comparison_plans(
     settings: Iterable[str] = (),
     grid: Iterable[str] = (),
 ) -> dict[str, SweepPlan]:
-    """Plans a comparison for each scenario of a command line, by name of the scenario.
+    """Makes the plans of ``phonotaxis compare`` from its command line.
 
-    The name has neither folder nor file ending. Without scenarios, the plans are those
-    for the experiments of the papers. All other arguments are options of the command;
-    lists are separated by commas, and settings have the form ``key=value``. For the
-    defaults, see ``comparison_plan``. Raises InputError, which names the option or the
-    field, if an argument is not valid.
+    Args:
+        scenarios: Scenarios, see ``comparison_plan``. If there are none, the result has
+            plans for the experiments of the papers.
+        laws: Names of the laws, separated by commas.
+        velocity_terms: Values of ``collision_vector.velocity_term``, separated by
+            commas.
+        runs: Number of layouts per scenario.
+        seed: Seed of the layouts and of the noise, a whole number.
+        settings: Texts of the form ``key=value``.
+        grid: Texts of the form ``key=[value, ...]``.
+
+    Returns:
+        Plan of each scenario, by its name without folder and file ending.
+
+    Raises:
+        InputError: An argument is not valid. The error names the option or the field.
     """
     fields = dict(parse_setting(text) for text in settings)
     varied = dict(_listed_values(text) for text in grid)

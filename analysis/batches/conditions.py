@@ -1,4 +1,4 @@
-"""Conditions of a sweep on its layouts, in addition to those of a valid scenario."""
+"""Conditions that a sweep can place on its layouts besides being valid scenarios."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ class Conditions(Parameters):
     """Distances that a layout must keep, and a path that it must leave free."""
 
     start_distance_m: NonNegativeLength = 0.0
-    """Least distance between each robot and any body at time zero, m. The distance
-    starts at the midpoint of the robot's wheel axle, the origin of B."""
+    """Least distance at time zero from the origin of each robot's frame B (the middle
+    of the wheel axle) to the outline of any body, m."""
     source_distance_m: NonNegativeLength = 0.0
     """Least distance between the outlines of a source and an obstacle during the whole
     run, m."""
     way_radius_m: Length | None = None
-    """Radius of a disc, m. A path between the obstacles at rest must be free for this
-    disc. The path begins at each robot's start. The path ends where the control point
-    P can be at the follow distance from the source. The center of the disc is the
-    origin of B."""
+    """Radius of a disc around the origin of B, m. There must be a path on which this
+    disc passes between the obstacles at rest. The path leads from each robot's start
+    to a place where the control point P can be at the follow distance from the
+    source."""
 
     def check(self, scenario: Scenario) -> None:
-        """Raises InputError, with the condition's name, if a layout violates it."""
+        """Raises InputError if a layout violates a condition, which the error names."""
         if self == Conditions():
             return
         self._check_source(scenario)
@@ -61,11 +61,10 @@ class Conditions(Parameters):
         obstacles = [Body(each.path(), each.size_m) for each in scenario.obstacles]
         if not self.source_distance_m or not obstacles:
             return
-        from analysis.runs.proximity import least_clearances  # compiled code
+        from analysis.runs.proximity import least_clearances  # compiles code
 
         for name, source in scenario.sources.items():
-            # Planned positions of the source. The source drives within centimeters of
-            # them.
+            # These are planned positions. The source stays within centimeters of them.
             plan = Body(source.plan(), (source.length_m, source.width_m))
             moves = any(body.path.moves for body in (plan, *obstacles))
             times = np.arange(0.0, scenario.duration_s if moves else STEP_S, STEP_S)
@@ -103,7 +102,7 @@ class Conditions(Parameters):
             )
 
 
-# Cells of a grid that share their draws repeat the same question.
+# All cells of a paired sweep have the same layouts and need the same answer.
 @lru_cache(maxsize=16)
 def _has_way(
     start: tuple[float, float],
@@ -112,7 +111,7 @@ def _has_way(
     boxes: tuple[tuple[float, ...], ...],
     radius: float,
 ) -> bool:
-    from analysis.runs.shortest_path import shortest_path_length  # so is this
+    from analysis.runs.shortest_path import shortest_path_length  # compiles code
 
     rectangles = np.array(boxes).reshape(-1, 5)
     # The search for the shortest path accepts a start that is nearer than the radius

@@ -1,8 +1,8 @@
 """Runs of a parameter sweep on a Dask cluster.
 
-Each thread of a Dask worker runs the scenarios in a ``WorkerProcess``, as a local sweep
-does. This limits the use of memory: Drake never frees blocks that are written in
-Python, and a Dask worker lives for a long time.
+Each thread of a Dask worker runs its scenarios in a separate ``WorkerProcess``, as a
+local sweep does. This limits the use of memory: Drake never frees blocks that are
+written in Python, and a Dask worker lives for a long time.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ _CONNECT_S = 10.0
 
 _LOGGER = logging.getLogger("phonotaxis")
 
+#: Idle processes of the Dask worker in which this module is loaded.
 _idle: deque[WorkerProcess] = deque()
 
 
@@ -115,7 +116,8 @@ def run_on_cluster(
         Results of the runs, in the order in which the runs end.
 
     Raises:
-        WorkerError: The cluster is gone, or has had no workers for ``PATIENCE_S``.
+        WorkerError: The cluster cannot be reached any more, or has had no workers for
+            ``PATIENCE_S``.
     """
     with _silent_dask():
         yield from _outcomes(tasks, pulse, client)
@@ -123,7 +125,7 @@ def run_on_cluster(
 
 @contextmanager
 def _silent_dask() -> Iterator[None]:
-    """Disables the log messages of Dask; our own message describes each fault."""
+    """Disables the log messages of Dask. The errors of this module state each fault."""
     names = [*logging.root.manager.loggerDict, "asyncio"]
     loggers = [
         logging.getLogger(name)
@@ -228,5 +230,5 @@ def _run_remotely(task: Task) -> Outcome:
 
 
 def _dismiss_idle() -> None:
-    """Ends the idle worker processes of a Dask worker; runs in this worker."""
+    """Ends the idle processes of the Dask worker in which this function runs."""
     close_workers(_idle)

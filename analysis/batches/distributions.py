@@ -34,7 +34,7 @@ def _require_order(name: str, span: tuple[float, float]) -> None:
 
 
 class Boxes(Parameters):
-    """Boxes at rest with random headings, spread evenly over a rectangle."""
+    """Random boxes at rest. Centers and headings have uniform distributions."""
 
     count: BoxCounts
     """[low, high]: number of boxes, including both ends. All numbers are equally
@@ -70,7 +70,7 @@ class Boxes(Parameters):
 
 
 class Sector(Parameters):
-    """Positions spread evenly over the area of a sector of a ring."""
+    """Random positions, uniformly distributed over the area of a sector of a ring."""
 
     about_m: Point
     """(x, y) of the ring's center in W, m."""
@@ -100,7 +100,11 @@ _CHANGES = ("each", "either_sign")
 
 
 class Distribution(Parameters):
-    """Exactly one distribution; ``each`` and ``either_sign`` change the drawn value."""
+    """A distribution, which exactly one of the fields defines.
+
+    The fields ``each`` and ``either_sign`` define no distribution. They change the
+    drawn number.
+    """
 
     uniform: Numbers | None = None
     """[low, high]: uniform distribution between low and high."""
@@ -119,8 +123,8 @@ class Distribution(Parameters):
     sector: Sector | None = None
     """Random position, for fields like ``position_m``."""
     each: Pairs | None = None
-    """One pair [a, b] for each path of the key, in the order of the paths. The field at
-    the path gets a times the drawn number, plus b."""
+    """One pair [a, b] for each path that the key lists, in the same order. If x is the
+    drawn number, the field at this path gets a x + b."""
     either_sign: Literal[True] | None = None
     """If true, the sign of the drawn number changes with probability 1/2."""
 
@@ -165,13 +169,13 @@ class Distribution(Parameters):
 
     @property
     def numeric(self) -> bool:
-        """Whether the drawn values are numbers, which can be ordered."""
+        """Whether the distribution draws numbers; always false for ``choice``."""
         return self.choice is None and self.boxes is None and self.sector is None
 
     def draw(self, generator: np.random.Generator, count: int = 1) -> list[Any]:
-        """Draws one value, and derives from it the plain values of ``count`` fields.
+        """Draws one value, and returns the values that ``count`` fields get from it.
 
-        If ``each`` is set, it has one entry for each field.
+        All fields get the drawn value, unless ``each`` has one pair for each field.
         """
         if self.boxes is not None:
             return [self.boxes.draw(generator)] * count

@@ -62,9 +62,12 @@ def picture_files(batch: Batch) -> dict[str, str]:
 def write_examples(batch: Batch) -> None:
     """Repeats the example runs of a batch, and writes them into its directory.
 
-    The folder ``examples`` gets a scenario file for each example, so that users can
-    repeat the run, a replay of the typical run of each cell, and a picture of all
-    examples of each scenario. A sweep that does not compare laws has no examples.
+    The function writes these files into the folder ``examples``. A sweep that does not
+    compare laws has no examples.
+
+    - A scenario file of each example, with which users can repeat the run.
+    - A replay of the typical run of each cell, as an HTML page.
+    - One picture per scenario, which shows all examples of this scenario.
     """
     files, pictures = example_files(batch), picture_files(batch)
     if not files:
@@ -83,7 +86,7 @@ def write_examples(batch: Batch) -> None:
 def _run_examples(
     batch: Batch, cell: Cell, files: dict[ExampleKey, str]
 ) -> Iterator[RunResult]:
-    """Repeats a cell's examples; writes their scenarios and the typical replay."""
+    """Repeats the examples of a cell; writes scenarios, and a replay of one run."""
     from analysis.views.replay import write_replay
 
     sweep = batch.sweeps[cell.scenario]
@@ -102,7 +105,7 @@ def _run_examples(
 
 
 def plot_examples(rows: Sequence[tuple[Cell, Sequence[RunResult]]]) -> Figure:
-    """Draws the worst, typical and best run of each cell from above, in W, m."""
+    """Draws each cell in a row: worst, typical and best run from above, in W, m."""
     results = [result for _, runs in rows for result in runs]
     limits = np.array([bounds(result, margin=0.6) for result in results])
     x_low, y_low = limits[:, 0].min(), limits[:, 2].min()

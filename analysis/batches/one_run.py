@@ -46,9 +46,9 @@ class Task:
     engine: Engine
     """Engine for the run: ``drake`` or ``compiled``."""
     trajectory: bool
-    """Whether to return the trajectory."""
+    """Whether to return the trajectory, the table with one row per tick."""
     files: Mapping[str, str] = field(default_factory=dict)
-    """SHA-256 of the sweep's input files at its start, by absolute path."""
+    """SHA-256 of each input file when the sweep started, by absolute path."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Outcome:
     - ``simulated_s``, ``wall_s``, ``engine``, ``error``.
     - ``warnings``: list of mappings with ``field`` and ``message``."""
     trajectory: bytes | None = None
-    """Contents of a Parquet file."""
+    """Trajectory of the run as the contents of a Parquet file, or None."""
 
 
 def run_task(task: Task) -> Outcome:
@@ -96,7 +96,7 @@ def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
 
 
 def lost_outcome(task: Task, reason: str) -> Outcome:
-    """Makes the result of a run whose worker ended at every attempt."""
+    """Makes the result of a run during which its worker ended, at every attempt."""
     return Outcome(_row(task, FAILED, perf_counter(), error=reason))
 
 
@@ -153,7 +153,7 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 
     The table has these columns:
 
-    - Each value of the row that is not a mapping.
+    - Each value of ``Outcome.row`` that is not a mapping.
     - Each field of the parameter sweep, by its dotted path.
     - The ending of each robot, for example ``<name>.cause``, if there are several.
     - Each metric.
@@ -196,7 +196,7 @@ def parquet_bytes(table: pd.DataFrame) -> bytes:
 
 
 def _keys(rows: Sequence[dict[str, Any]], group: str) -> list[str]:
-    """Keys of a mapping over all rows, in order; rows of failed runs lack some keys."""
+    """Returns the keys of the mapping ``group`` that occur in any row, in order."""
     return list(dict.fromkeys(key for row in rows for key in row[group]))
 
 

@@ -18,7 +18,7 @@ def check_options(
     scheduler: str | None = None,
     resume: bool = False,
 ) -> None:
-    """Raises InputError if an option is not valid, or if two exclude each other."""
+    """Raises InputError if an option is not valid or contradicts another option."""
     if workers is not None and not 1 <= workers <= MOST_WORKERS:
         raise InputError("workers", f"{workers} must lie between 1 and {MOST_WORKERS}")
     if scheduler is not None and workers is not None:

@@ -1,4 +1,4 @@
-"""The HTML page of a batch: endings, estimates, maps, pairs, and runs to repeat."""
+"""Makes the HTML page of a batch: endings, rates, metrics, pairs, and commands."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ from analysis.report.section import (
 from diagrams.running.stop_rules import SUCCESSFUL
 
 #: Limits that keep a page readable.
-#: MOST_MAPS: number of heat maps.
-#: MOST_ERRORS: number of commands for runs that raised an error.
-#: MOST_OTHERS: number of commands for runs with any other cause of failure.
+#: MOST_MAPS: greatest number of heat maps.
+#: MOST_ERRORS: greatest number of commands for runs that raised an error.
+#: MOST_OTHERS: greatest number of commands for each other cause of failure.
 MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
 
 
@@ -99,9 +99,10 @@ _PAIRS = "Pairs of runs on the same layouts; differences, first less second"
 def _scenario(
     batch: Batch, summary: Summary, document: dict[str, Any], prefix: str
 ) -> dict[str, list[Content]]:
-    """Parts of the page about one scenario, by title, without empty parts.
+    """Returns the parts of the page about one scenario, by title.
 
-    The prefix distinguishes its figures from those of other scenarios.
+    Empty parts are omitted. The names of the figures begin with ``prefix``, because
+    they must be unique on the page.
     """
     plan, rows = summary.plan, summary.rows
     few = plan.cell_count <= MOST_CELLS
@@ -114,7 +115,7 @@ def _scenario(
             *_examples(batch, summary, document),
             *_commands(batch, summary),
         ],
-        # The page of several scenarios would become too long.
+        # With several scenarios, the page would become too long.
         "Over the draws": _marginals(plan, rows) if len(batch.summaries) == 1 else [],
         **({} if few else cells),
     }
@@ -176,7 +177,7 @@ def _listed(fields: dict[str, Any]) -> str:
 
 
 def _table(rows: Sequence[Sequence[str]], caption: str) -> Table:
-    """A table of texts, in whose numbers and intervals no line breaks."""
+    """Makes a table of texts, with true minus signs. Intervals stay on one line."""
 
     def whole(text: str) -> str:
         text = re.sub(r"(^|[ (e])-(?=\d)", "\\1\u2212", text)
@@ -222,7 +223,7 @@ def _endings(summary: Summary) -> list[Content]:
 
 
 def _figure(figure: Drawing, name: str, caption: str, *, scale: bool = False) -> Markup:
-    """Draws a figure of the page; each name may occur once on a page."""
+    """Converts a figure to HTML. The name must be unique on the page."""
     return html(Figure(lambda: figure, caption, scale), name)
 
 
@@ -257,7 +258,7 @@ def _maps(plan: SweepPlan, results: pd.DataFrame, prefix: str) -> list[Content]:
 
 
 def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
-    """Axes of the maps, the two fields with most values; and the other fields."""
+    """Returns the two fields of the grid with the most values, and the other fields."""
     by_size = sorted(plan.grid, key=lambda path: -len(plan.grid[path]))
     chosen = [path for path in plan.grid if path in by_size[:2]]
     return chosen, [path for path in plan.grid if path not in chosen]
@@ -271,8 +272,8 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
             f"Every metric over `{key}`, in bins with equal numbers of runs.",
         )
         for k, (key, drawn) in enumerate(plan.draw.items())
-        # A list of boxes is no number and is never drawn twice. It has no marginal.
-        # Fewer runs than those of two bins show no dependence.
+        # Lists of boxes are not numbers, and no list is drawn twice. Therefore the runs
+        # cannot be sorted by them. A single bin would show no dependence.
         if drawn.boxes is None and len(results) >= 2 * LEAST_RUNS
     ]
 
@@ -280,7 +281,7 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
 def _examples(
     batch: Batch, summary: Summary, document: dict[str, Any]
 ) -> list[Content]:
-    """Picture, commands and existing replays of the examples of a scenario."""
+    """Returns picture, commands, and existing replays of the examples of a scenario."""
     file = picture_files(batch)[summary.name]
     cells = [
         (cell, own)
@@ -308,7 +309,7 @@ def _examples(
 
 
 def _commands(batch: Batch, summary: Summary) -> list[Content]:
-    """Commands that repeat the first failed runs of each cause, errors first."""
+    """Returns commands that repeat the first failed runs of each cause."""
     parts: list[Content] = ["Each command repeats one run and makes its replay."]
     rows = summary.rows
     causes = [c for c in rows["cause"].value_counts().index if c not in SUCCESSFUL]

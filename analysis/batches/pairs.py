@@ -1,8 +1,9 @@
 """Compares cells of a paired sweep, run by run.
 
-A layout is one variant of the positions and motions of all bodies. In a paired sweep,
-every cell meets the same layouts with the same seeds. The two runs of a pair therefore
-differ only in the fields of the grid.
+A cell of a sweep is one combination of the values in its grid. A layout is one variant
+of the positions and motions of all bodies. A paired sweep runs every cell on the same
+layouts with the same seeds. Two runs on the same layout therefore differ only in the
+fields of the grid.
 """
 
 from __future__ import annotations
@@ -26,11 +27,16 @@ from analysis.runs.metric_table import METRICS
 
 @dataclass(frozen=True)
 class PairedRate:
-    """How often one method had an outcome that the other method did not have."""
+    """Comparison of how often two methods had an outcome on the same layouts.
+
+    A method is, for example, a control law. An outcome is, for example, a collision. A
+    pair consists of the two runs on one layout.
+    """
 
     only_first: int
-    """Pairs in which the first method had the outcome and the second had not."""
+    """Number of pairs in which only the first method had the outcome."""
     only_second: int
+    """Number of pairs in which only the second method had the outcome."""
     difference: Estimate
     """Rate of the first method minus rate of the second method."""
     p_value: float
@@ -39,14 +45,14 @@ class PairedRate:
 
 @dataclass(frozen=True)
 class PairedMedian:
-    """Difference of a metric between two methods, with an interval and a test."""
+    """Comparison of the values of a metric of two methods on the same layouts."""
 
     first: float
-    """Median of the first method over the pairs."""
+    """Median of the values of the first method, over the pairs."""
     second: float
-    """Median of the second method over the pairs."""
+    """Median of the values of the second method, over the pairs."""
     difference: Estimate
-    """Median over the pairs of the first value minus the second value."""
+    """Median of the differences over the pairs: first value minus second value."""
     p_value: float
     """Two-sided p-value of the Wilcoxon signed-rank test that the differences are
     symmetric about zero."""
@@ -58,27 +64,30 @@ class Pair:
 
     scenario: str
     field: str
+    """Dotted path of the field in which the cells differ."""
     first: Any
-    """Value of the field in the first cell."""
+    """Value of this field in the first cell."""
     second: Any
+    """Value of this field in the second cell."""
     fields: dict[str, Any]
-    """Fields with the same value in both cells."""
+    """Values that both cells have in common, by dotted path of the field."""
     success: PairedRate
     collision: PairedRate
     metrics: dict[str, PairedMedian]
     encounters: dict[str, PairedMedian]
-    """Metrics over the layouts on which both runs succeeded and both had repulsion from
-    an obstacle. On other layouts, laws differ only near the body of the source."""
+    """Metrics over the layouts on which both runs succeeded and an obstacle repelled
+    the robot in both runs. Without this repulsion, laws differ only near the body of
+    the source."""
 
     @property
     def label(self) -> str:
-        """Both values, and the fields that the cells have in common."""
+        """Both values of the field, and the values that the cells have in common."""
         common = "".join(f", {value}" for value in self.fields.values())
         return f"{self.first} less {self.second}{common}"
 
 
 def pairs_of(plan: SweepPlan, rows: pd.DataFrame, scenario: str) -> list[Pair]:
-    """Compares each two cells of a paired sweep that differ in exactly one field.
+    """Compares any two cells of a paired sweep that differ in exactly one field.
 
     The rows of each cell must be sorted by layout.
     """
@@ -86,7 +95,10 @@ def pairs_of(plan: SweepPlan, rows: pd.DataFrame, scenario: str) -> list[Pair]:
 
 
 def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]:
-    """Compares each pair of values of a field over several scenarios together."""
+    """Compares any two values of a field over the runs of several scenarios together.
+
+    Each element of ``sweeps`` is the plan of a paired sweep and the table of its runs.
+    """
     groups: dict[tuple[str, str, str], list[_Neighbors]] = {}
     for plan, rows in sweeps:
         for one in _neighbors(plan, rows):
@@ -152,7 +164,10 @@ def _pushed(rows: pd.DataFrame) -> NDArray[np.bool_]:
 def _medians(
     first: pd.DataFrame, second: pd.DataFrame, chosen: Mapping[str, NDArray[np.bool_]]
 ) -> dict[str, PairedMedian]:
-    """Compares metrics over the layouts chosen for the kind of runs that they count."""
+    """Compares the metrics of two cells, over those layouts that count for the metric.
+
+    The flags ``chosen[metric.of]`` (n,) tell which of the n layouts count.
+    """
     medians = {
         name: paired_median(column(first, name)[layouts], column(second, name)[layouts])
         for name, metric in METRICS.items()
@@ -166,10 +181,11 @@ def paired_rate(
 ) -> PairedRate:
     """Compares how often two methods have an outcome, for example a collision.
 
-    The flags (n,) of each method tell whether it had the outcome on each of the same n
-    layouts, n >= 1. The confidence interval is the adjusted Wald interval of Bonett and
-    Price (2012). This interval keeps its coverage even for rare outcomes and small
-    samples. The p-value is that of the exact McNemar test.
+    The arguments ``first`` and ``second`` are (n,) flags, n >= 1. They tell whether
+    each method had the outcome on each of the same n layouts. The confidence interval
+    is the adjusted Wald interval of Bonett and Price (2012). This interval keeps its
+    coverage even for rare outcomes and small samples. The p-value is that of the exact
+    McNemar test.
     """
     from scipy.stats import binomtest, norm
 
@@ -196,8 +212,9 @@ def paired_median(
 ) -> PairedMedian | None:
     """Compares the values (n,) of a metric between two methods on the same n layouts.
 
-    A run without a value has NaN. The p-value is that of the Wilcoxon signed-rank test.
-    The result is None if no layout has values of both methods.
+    NaN means that a run has no value. Only layouts with values of both methods count.
+    The p-value is that of the Wilcoxon signed-rank test. The result is None if no
+    layout has values of both methods.
     """
     from scipy.stats import wilcoxon
 

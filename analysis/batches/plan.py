@@ -1,4 +1,4 @@
-"""The plan of a sweep: its scenarios, their random draws, and their seeds."""
+"""The plan of a sweep: which scenarios to run, with random draws and seeds."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class SweepPoint:
     cell: int
     """Number of the cell of the grid, from 0."""
     run: int
-    """Number of the draw within the cell, from 0."""
+    """Number of the run within the cell, from 0."""
     seed: int
     """Seed of the scenario."""
     fields: dict[str, Any]
-    """Value of every field of grid and draw, by dotted path."""
+    """Values of all fields in ``grid`` and ``draw``, by dotted path."""
     redraws: int
     """Number of draws that made no valid scenario and were replaced."""
 
@@ -62,7 +62,8 @@ class SweepPlan(Parameters):
 
     The format is described in docs/compare.md. A field has a dotted path, for example
     ``source.speed_m_s``. A key of ``draw`` may list several paths, separated by commas.
-    All these fields then get the same drawn value.
+    All these fields then get the same drawn value, or values that ``each`` of the
+    distribution derives from the drawn number.
     """
 
     name: str = Field(default="sweep", min_length=1, pattern=r"^[^\n]*$")
@@ -75,8 +76,8 @@ class SweepPlan(Parameters):
     grid: dict[str, GridValues] = Field(default_factory=dict)
     """Fields with several values. Each combination of values is a cell."""
     draw: dict[str, Distribution] = Field(default_factory=dict)
-    """Fields that are drawn for every run. They are set after ``set`` and ``grid``, in
-    this order."""
+    """Distributions of the fields that are drawn for every run. A scenario first gets
+    the fields of ``set``, then those of ``grid``, and then the drawn fields."""
     require: Conditions = Conditions()
     """Conditions on every layout. If a draw violates them, the draw is not valid."""
     runs: Count = 1
@@ -86,8 +87,9 @@ class SweepPlan(Parameters):
     pair: bool = True
     """If true, run k has the same draws and the same scenario seed in every cell."""
     redraws: int = Field(default=0, ge=0, le=10_000)
-    """How often a run is drawn again if its draws make no valid scenario. With
-    ``pair``, the scenario must be valid in all cells."""
+    """Greatest number of times that a run is drawn again if its draws make no valid
+    scenario. If ``pair`` is true, the draws must make a valid scenario in every
+    cell."""
     trajectories: bool = False
     """Whether to keep the trajectory of every run."""
     folder: str = Field(default=".", min_length=1, exclude=True)
@@ -133,9 +135,8 @@ class SweepPlan(Parameters):
     def base(self) -> dict[str, Any]:
         """Fields of the scenario file after ``set`` is applied.
 
-        The caller must not change this mapping. Another field of the parameter sweep
-        may set an element of a list. The mapping then contains the whole list, even if
-        the scenario file omits the list.
+        The caller must not change this mapping. If the sweep sets an element of a list,
+        the mapping contains the whole list, even if the scenario file omits the list.
         """
         data = written_fields(self.source)
         _state_lists(data, scenario_from_mapping(data), self.set)
@@ -146,7 +147,7 @@ class SweepPlan(Parameters):
 
     @cached_property
     def _base_copy(self) -> bytes:
-        """Pickle of ``base``; loading it takes a fifth of the time of ``deepcopy``."""
+        """Pickle of ``base``. Loading it is five times faster than ``deepcopy``."""
         return pickle.dumps(self.base)
 
     @property
@@ -158,7 +159,7 @@ class SweepPlan(Parameters):
 
     @property
     def paths(self) -> list[str]:
-        """Dotted paths of all fields that differ between runs."""
+        """Dotted paths of all fields in ``grid`` and ``draw``."""
         return [path for key in (*self.grid, *self.draw) for path in _paths(key)]
 
     @property
@@ -167,7 +168,7 @@ class SweepPlan(Parameters):
         return math.prod(len(values) for values in self.grid.values())
 
     def cells(self) -> list[dict[str, Any]]:
-        """Returns the grid's fields in each cell; an empty grid has one cell."""
+        """Returns the values of ``grid`` in each cell; an empty grid has one cell."""
         return [
             dict(zip(self.grid, values, strict=True))
             for values in product(*self.grid.values())
@@ -198,9 +199,9 @@ class SweepPlan(Parameters):
     def check(self) -> None:
         """Checks the first 64 cells of the grid, before all runs are drawn.
 
-        A cell is one combination of the values in the grid. Each cell is checked
-        without random draws, and with the first draws. A cell is rejected only if both
-        scenarios are not valid. This check is quick. ``points`` is slower, but finds
+        A cell is one combination of the values in the grid. The function checks each
+        cell twice: without random draws, and with the first draws. It rejects a cell
+        only if neither scenario is valid. The method ``points`` is slower, but finds
         all faults.
 
         Raises:
@@ -243,7 +244,7 @@ class SweepPlan(Parameters):
 
     @cached_property
     def file_digests(self) -> dict[str, str]:
-        """SHA-256 of each file that influences the runs: sounds, and users' modules."""
+        """SHA-256 of each sound file and user's module that the runs use, by path."""
         values = {**self.base, **self.grid, **self.model_dump(include={"draw"})["draw"]}
         files: set[Path] = set()
         for field, text in _texts("", values):
@@ -260,7 +261,13 @@ class SweepPlan(Parameters):
     def _draw_run(
         self, run: int, cells: list[tuple[int, dict[str, Any]]], stream: list[int]
     ) -> list[SweepPoint]:
-        """Draws one run in all cells that share its draws."""
+        """Draws one run in several cells, which all get the same draws.
+
+        The argument ``run`` is the number of the run, and ``cells`` contains the
+        number and the fields of each cell. The numbers in ``stream`` make the draws
+        differ from those of other cells. Raises InputError if no attempt gives a valid
+        scenario in all cells.
+        """
         entropy = [self.seed, run, *stream]
         seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0] >> 1)
         for attempt in range(self.redraws + 1):
@@ -283,7 +290,7 @@ class SweepPlan(Parameters):
         raise complaint
 
     def _complaint(self, points: list[SweepPoint]) -> InputError | None:
-        """Describes the fault of the first point whose scenario is not valid."""
+        """Returns the fault of the first scenario that is not valid, or None."""
         for point in points:
             try:
                 self.require.check(self.scenario_of(point))
@@ -302,7 +309,11 @@ class SweepPlan(Parameters):
         return bool(self.draw) and self._fault(undrawn) is None
 
     def _draws(self, entropy: list[int]) -> Iterator[tuple[str, Any]]:
-        """Draws the fields; each key has its own independent random stream."""
+        """Draws the values of all fields in ``draw``; yields paths and values.
+
+        The numbers in ``entropy`` are the seed. The draws of one key do not depend on
+        the other keys.
+        """
         for key, distribution in self.draw.items():
             words = [*entropy, crc32(key.encode())]
             generator = np.random.Generator(np.random.Philox(seed=words))
@@ -334,7 +345,7 @@ def _paths(key: str) -> list[str]:
 
 
 def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
-    """Every text within a value, each with the name of the field that contains it."""
+    """Yields each text within a value, preceded by the name of its field."""
     if isinstance(value, dict):
         for inner, item in value.items():
             for path in _paths(str(inner)):
@@ -391,7 +402,7 @@ def _check_path(field: str, path: str, earlier: list[str]) -> None:
 
 
 def _check_presets(part: str, keys: Iterable[str], fixed: list[str]) -> None:
-    """Rejects a preset that would discard values of the scenario from ``set``."""
+    """Rejects a field ``preset`` that would overwrite a field in ``set``."""
     for path in (path for key in keys for path in _paths(key)):
         group, _, last = path.rpartition(".")
         for other in fixed if last == "preset" else ():

@@ -1,4 +1,4 @@
-"""Pictures of a sweep: quantities over the cells, the grid, and the drawn fields."""
+"""Draws rates and metrics of a sweep over its cells, its grid, and drawn fields."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from analysis.report.intervals import Estimate
 from analysis.report.palette import draw_grid, luminance
 
 WIDTH_IN = 9.0
-#: MOST_NUMBERS: greatest number of columns for which cells show their numbers.
+#: MOST_NUMBERS: greatest number of columns of a heat map with numbers in its fields.
 #: MOST_TICKS: greatest number of values that an axis shows.
 MOST_NUMBERS, MOST_TICKS = 8, 20
 #: Colors of curves, after Okabe and Ito. Color-blind people can distinguish them.
@@ -81,7 +81,7 @@ def _limits(quantity: Quantity, runs: Sequence[pd.DataFrame]) -> tuple[float, fl
 def _panels(
     results: pd.DataFrame, height_in: float
 ) -> tuple[Figure, list[tuple[Axes, Quantity]]]:
-    """Makes a panel for each quantity, two per row; each row has the given height."""
+    """Makes a panel for each quantity. Each row has two panels and the given height."""
     shown = quantities(results, pictures=True)
     rows = math.ceil(len(shown) / 2)
     figure = Figure(figsize=(WIDTH_IN, height_in * rows), layout="constrained")
@@ -140,7 +140,7 @@ def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
 
 
 def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
-    """Draws each quantity of each cell in a row of its own, with 95 % intervals."""
+    """Draws one panel per quantity, with one row per cell and 95 % intervals."""
     labels = [cell_label(fields) for fields in plan.cells()]
     places = np.arange(len(labels), dtype=float)
     figure, panels = _panels(results, 0.9 + 0.32 * len(labels))
@@ -160,7 +160,7 @@ def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
 
 
 def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
-    """Draws each quantity over the only field of the grid, with 95 % intervals."""
+    """Draws each quantity over x, the only field of the grid, with 95 % intervals."""
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
         estimates = [quantity.estimate(runs) for runs in by_cell(plan, results)]
@@ -174,9 +174,9 @@ def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
 def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
     """Draws each quantity as a function of one drawn field, a key of ``plan.draw``.
 
-    If a field of the grid has few enough values, the picture has one curve for each of
-    these values. If several fields have, the first field is used. Each curve combines
-    the runs over all other fields.
+    The curves are those of the first field of the grid that has two to four values: one
+    curve per value. If there is no such field, there is one curve. Each curve combines
+    the runs with all values of the other fields.
     """
     runs = results
     split = next(
@@ -220,7 +220,7 @@ def _errorbars(
     *,
     across: bool = False,
 ) -> None:
-    """Draws estimates as a curve, or across the axes as one point per row."""
+    """Draws estimates as a curve; if ``across`` is true, as one point per row."""
     value, low, high = np.array([(each.value, *each.ends) for each in estimates]).T
     spread = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
     axes.errorbar(

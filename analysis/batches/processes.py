@@ -16,10 +16,10 @@ from analysis.batches.one_run import Outcome, Task, lost_outcome
 from analysis.batches.worker import READY
 from analysis.run_error import RunError
 
-#: Greatest number of attempts at a run. If the worker ends before it returns a result,
-#: the next attempt follows.
+#: Greatest number of attempts at a run. Another attempt follows if the worker process
+#: ends before it returns a result.
 ATTEMPTS = 2
-#: Number of tasks that a worker has at a time, so that it never waits for a task.
+#: Number of tasks that a worker has at a time. While it runs one, the next one waits.
 AHEAD = 2
 #: Longest time between two calls of ``pulse``, s.
 PULSE_S = 0.25
@@ -34,7 +34,10 @@ class WorkerProcess:
     """A worker in a separate process; see ``analysis/batches/worker.py``."""
 
     def __init__(self, task: Task) -> None:
-        """Starts the process, which loads the code for the task but does not run it."""
+        """Starts the process.
+
+        The process loads the code for the task, but does not run the task.
+        """
         ours, theirs = socket.socketpair()
         self.connection = Connection(ours.detach())
         self.tasks: deque[Task] = deque()
@@ -61,7 +64,7 @@ class WorkerProcess:
             self.connection.send(message)
 
     def give(self, task: Task) -> None:
-        """Sends a task; ``receive`` returns the results in the order of the tasks."""
+        """Sends a task to run. The results arrive in the order of the tasks."""
         self.tasks.append(task)
         self._send(task)
 
@@ -91,7 +94,7 @@ class WorkerProcess:
         return outcome
 
     def close(self) -> None:
-        """Ends the process and its child at once."""
+        """Ends the process, and its child that does the runs, at once."""
         self.connection.close()
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
@@ -115,8 +118,9 @@ def run_locally(
         pulse: Function that is called a few times per second. If it raises an
             exception, the work ends.
         workers: Number of processes.
-        idle: Processes that are used first. The function returns its processes to this
-            queue, which several threads may share. None means that the processes end.
+        idle: Queue of processes, which several threads may share. The function uses
+            these processes before it starts new ones. At the end, it puts all idle
+            processes into the queue. None means that all processes end.
 
     Yields:
         Results of the runs, in the order in which the runs end.
@@ -145,6 +149,8 @@ def close_workers(workers: deque[WorkerProcess]) -> None:
 
 
 class _Pool:
+    """Worker processes, and the tasks that they still have to run."""
+
     def __init__(self, tasks: Iterator[Task], idle: deque[WorkerProcess]) -> None:
         self.busy: dict[Connection, WorkerProcess] = {}
         self.idle = idle

@@ -1,4 +1,4 @@
-"""Results of a batch as a JSON document, as text, and as files."""
+"""Results of a batch as a JSON document, as text, and as rows of tables."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from analysis.runs.metric_table import METRICS
 
 
 def batch_document(batch: Batch) -> dict[str, Any]:
-    """Makes the JSON document of a batch, from plain values."""
+    """Makes the JSON document of a batch."""
     plan = next(iter(batch.summaries.values())).plan
     tables = [each.rows for each in batch.summaries.values()]
     files = example_files(batch)
@@ -110,7 +110,7 @@ def batch_text(batch: Batch, document: dict[str, Any]) -> str:
 
 
 def estimate_rows(summary: Summary) -> list[list[str]]:
-    """A heading, and one row with the estimates of each cell."""
+    """Returns the rows of a table: a heading, then the estimates of each cell."""
     shown = quantities(summary.rows, seed=summary.plan.seed)
     rows = [["cell", "runs", *(quantity.label for quantity in shown)]]
     for cell in summary.cells:
@@ -120,7 +120,10 @@ def estimate_rows(summary: Summary) -> list[list[str]]:
 
 
 def robot_rows(summary: Summary) -> list[list[str]]:
-    """A heading, and one row for each robot in each cell; empty for one robot."""
+    """Returns the rows of a table: a heading, then one row per cell and robot.
+
+    There are no rows if the scenario has only one robot.
+    """
     names = {robot: quantities(summary.rows, robot=robot) for robot in summary.robots}
     if not any(names.values()):
         return []
@@ -143,7 +146,10 @@ def _text_of(cell: Cell, quantity: Quantity) -> str:
 
 
 def pair_rows(pairs: Sequence[Pair], *, pictures: bool = False) -> list[list[str]]:
-    """A heading, and one row with the differences of each of at least one pair."""
+    """Returns the rows of a table: a heading, then the differences of each pair.
+
+    If ``pictures`` is true, metrics that only tables show are omitted.
+    """
     shown = [
         Quantity(name)
         for name, metric in METRICS.items()
@@ -180,12 +186,12 @@ def _endings(cells: list[Cell]) -> Iterator[str]:
 
 
 def counts_text(counts: dict[str, int]) -> str:
-    """Names, each with its count."""
+    """Lists names with their counts, for example ``reached 40, stuck 2``."""
     return ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
 def warning_lines(summary: Summary) -> list[str]:
-    """One line for each field with warnings."""
+    """Returns one line for each field of the scenario with warnings."""
     return [
         f"Warning in {each.runs} of {len(summary.rows)} runs: {each.field}: "
         f"{each.message}"

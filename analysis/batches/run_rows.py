@@ -36,11 +36,11 @@ def column(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
 
 
 def with_all_robots(table: pd.DataFrame, robots: Sequence[str]) -> pd.DataFrame:
-    """Adds the metrics of all robots together to the results of a parameter sweep.
+    """Adds metrics over all robots to the table of a parameter sweep.
 
     ``Metric.robots`` states how the values of several robots become one value of their
     run. If one robot has no value of a metric in a run, the value for all robots is
-    NaN. With one robot, the table already has the metrics.
+    NaN. If there is only one robot, the table is returned as it is.
     """
     if len(robots) < 2:
         return table
@@ -64,10 +64,10 @@ class WarningCount:
 
 
 def warning_counts(rows: pd.DataFrame) -> list[WarningCount]:
-    """Counts the warnings of runs by field of the scenario, the most frequent first.
+    """Counts the runs with a warning, for each field; the most frequent field first.
 
-    The column ``warnings`` contains JSON in the format of ``summary.json``. The table
-    may lack this column.
+    The column ``warnings`` contains JSON text: lists of mappings with the keys
+    ``field`` and ``message``. If the column is missing, the result is empty.
     """
     runs, messages = Counter[str](), dict[str, str]()
     for text in rows.get("warnings", ()):
@@ -75,6 +75,6 @@ def warning_counts(rows: pd.DataFrame) -> list[WarningCount]:
         runs.update({each["field"] for each in told})
         for each in told:
             messages.setdefault(each["field"], each["message"])
-    # Equal counts keep the order of the messages, because the order of a set is random.
+    # Fields with equal counts keep the order of ``messages``. A set has random order.
     fields = sorted(messages, key=lambda field: -runs[field])
     return [WarningCount(name, runs[name], messages[name]) for name in fields]

@@ -35,7 +35,7 @@ MANIFEST, PLAN = "sweep.json", "sweep.yaml"
 
 
 class StoreError(RunError):
-    """Results cannot be written; results that were written before are kept."""
+    """Results cannot be written. Earlier results are kept."""
 
 
 class SweepStore:
@@ -46,9 +46,10 @@ class SweepStore:
     ) -> None:
         """Opens the directory of a sweep, or creates the directory.
 
-        None means the next number under results/. The points are sorted by their
-        number. Raises InputError if the directory contains something else, cannot be
-        written, or is in use, and StoreError if the disk is full.
+        If ``out`` is None, the directory is the next number under results/. The
+        argument ``points`` contains all runs of the plan, sorted by their number.
+        Raises InputError if the directory contains anything but this sweep, or
+        is in use. Raises InputError or StoreError if it cannot be written.
         """
         self._journal = -1
         try:
@@ -75,7 +76,7 @@ class SweepStore:
             raise _unwritable(self.out, error) from None
 
     def _open(self, points: Sequence[SweepPoint]) -> None:
-        """Finds the finished runs, and drops lines that are not runs of the plan."""
+        """Finds the finished runs; removes lines of the file that are not runs."""
         path = self.out / JOURNAL
         if (self.out / TABLE).exists() and not path.exists():
             _check_table(self.out, points)
@@ -97,7 +98,7 @@ class SweepStore:
         self._journal = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
 
     def add(self, outcome: Outcome) -> None:
-        """Writes the results of a run; raises StoreError if the disk is full."""
+        """Writes the results of a run; raises StoreError if this fails."""
         index = outcome.row["index"]
         line = memoryview((json.dumps(outcome.row, allow_nan=False) + "\n").encode())
         size = os.fstat(self._journal).st_size
@@ -114,8 +115,8 @@ class SweepStore:
     def write_table(self, *, complete: bool) -> None:
         """Writes the table of all finished runs.
 
-        If all runs are finished, ``runs.jsonl`` is removed. Raises StoreError if the
-        disk is full or faulty.
+        If ``complete`` is true, all runs are finished, and ``runs.jsonl`` is removed.
+        Raises StoreError if the disk is full or faulty.
         """
         if self._journal < 0:
             return
@@ -234,10 +235,10 @@ def _check_same(out: Path, plan: SweepPlan) -> None:
 def _runs_of(
     points: Sequence[SweepPoint], lines: Sequence[bytes]
 ) -> tuple[dict[int, bytes], list[int]]:
-    """Returns the line of each run of a plan by its number, and numbers of other lines.
+    """Returns the line of each run, by number of the run, and numbers of wrong lines.
 
-    If two different lines claim to be the same run, neither is accepted. An unfinished
-    last line, left by a crash, is ignored. The numbers of lines start from 1.
+    If two different lines claim to be the same run, both count as wrong. An incomplete
+    last line is ignored, because a crash can leave one. Lines are numbered from 1.
     """
     found: dict[int, dict[bytes, int]] = {}
     others = []
@@ -253,7 +254,7 @@ def _runs_of(
 
 
 def _is_run_of(points: Sequence[SweepPoint], row: dict[str, Any]) -> bool:
-    """Whether a row has the index, the seed and the fields of one of the points."""
+    """Returns whether a row has the same seed and fields as the point of its index."""
     if not 0 <= row["index"] < len(points):
         return False
     point = vars(points[row["index"]])

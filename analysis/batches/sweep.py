@@ -1,4 +1,4 @@
-"""Runs a sweep: many variants of a scenario, in many processes, into one table."""
+"""Runs a sweep: many variants of a scenario, in several processes."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ class PreparedSweep:
         """Does all runs of a parameter sweep that are not in its directory yet.
 
         The function ``progress`` is called a few times per second with the number of
-        finished runs. If it raises an exception, the sweep ends. The table is that of
-        ``load_results``. Raises StoreError if the disk is full or faulty, and
-        WorkerError if worker processes cannot be started or reached.
+        finished runs. If it raises an exception, the sweep ends. Returns the table of
+        all runs, see ``load_results``. Raises StoreError if the disk is full or faulty,
+        and WorkerError if worker processes cannot be started or reached.
         """
 
         def pulse() -> None:
@@ -98,9 +98,9 @@ def prepare_sweep(
 ) -> PreparedSweep:
     """Draws and checks all runs of a parameter sweep, then opens its directory.
 
-    The directory is locked until the sweep has run, which it can do once. Raises
-    InputError, which states the fault and the remedy, if an argument or the plan is not
-    valid.
+    The directory is locked until ``PreparedSweep.run`` ends. This method can be called
+    only once. Raises InputError, which states the fault and the remedy, if an argument
+    or the plan is not valid.
 
     - ``out``: Directory of the results. None means the next number under results/.
     - ``workers``: Number of local processes. None means one process per processor core.
@@ -125,9 +125,10 @@ def prepare_sweep(
 
 
 def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
-    """Returns the shell command that repeats one run of the sweep in a directory.
+    """Returns the shell command that repeats one run of a sweep.
 
-    The engine is that of the run: ``drake`` or ``compiled``.
+    The argument ``out`` is the directory of the sweep, and ``engine`` is the engine of
+    the run: ``drake`` or ``compiled``.
     """
     words = ["phonotaxis", "simulate", str(out / "scenario.yaml")]
     for path, value in point.fields.items():
@@ -142,7 +143,7 @@ def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
 
     Some faults appear only when a diagram is built, for example an unknown control law.
     The function builds the diagram of the first run. It also builds the diagram of
-    every run in which a field has a new text or mapping as its value.
+    every run in which a field has a text or a mapping that no earlier run had.
 
     Returns whether scenarios that do not choose an engine use the compiled engine. They
     do if the sweep has many runs and numba can compile the code of the user.

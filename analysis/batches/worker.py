@@ -1,9 +1,9 @@
 """A worker process that does runs of a parameter sweep for another process.
 
-The worker loads all code that a run needs once. Then the worker forks a child process,
-which does the runs. Drake never frees blocks that are written in Python, so that the
-child grows by about 1 MB per run. The worker therefore replaces the child after 50 runs
-of Drake. Compiled runs share their blocks, so that a child does 1000 of them.
+The worker first loads all code that a run needs. Then it forks a child process, which
+does the runs. Drake never frees blocks that are written in Python. The child therefore
+grows by about 1 MB per run, and the worker replaces it after 50 runs with Drake. Runs
+with the compiled engine share their blocks, so a child does 1000 of these runs.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ def main(file_descriptor: int) -> None:
     with Connection(file_descriptor) as connection:
         try:
             task = connection.recv()
-            # Code of the task may end its process. That must not happen here, so a
-            # child process tries the code first.
+            # A user's code may end the process that loads it. Therefore a child process
+            # loads the code first.
             if _survives(lambda: _warm(task)):
                 _warm(task)
             connection.send(READY)
         except (EOFError, OSError):
             return
-        gc.freeze()  # else the collector writes to pages that children share
+        gc.freeze()  # otherwise, garbage collection copies memory in every child
         while _survives(lambda: _serve(connection)):
             pass
 
@@ -58,12 +58,12 @@ def _survives(work: Callable[[], None]) -> bool:
             work()
             status = 0
         finally:
-            os._exit(status)  # not a word to what waits for the end of Python
+            os._exit(status)  # skips what Python would do at exit
     return os.waitpid(child, 0)[1] == 0
 
 
 def _warm(task: Task) -> None:
-    """Loads compiled functions; ignores errors, because the run repeats them."""
+    """Loads compiled functions; ignores errors, which occur again in the run."""
     with contextlib.suppress(BaseException):
         if task.engine == "compiled":
             prepared_loop(task.scenario)
@@ -72,7 +72,7 @@ def _warm(task: Task) -> None:
 
 
 def _serve(connection: Connection) -> None:
-    """Runs tasks until the child is worn out; raises EOFError if the socket closes."""
+    """Runs ``RUNS_PER_CHILD`` tasks; raises EOFError if the socket closes before."""
     worn = 0.0
     while worn < 1.0:
         task: Task = connection.recv()

@@ -1,1 +1,1 @@
-"""Proves for sets of initial states that no collision follows."""
+"""Computes sets of initial states from which the robot provably never collides."""

@@ -1,4 +1,4 @@
-"""Plots certified sets and simulated trials."""
+"""Plots of certified sets of initial states, of simulated trials, and of energies."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from systems.world.geometry import rectangle_corners
 
 
 def draw_bodies(axes: Axes, model: PointMass) -> None:
-    """Draws obstacles, the source's body, the follow distance and control point P.
+    """Draws bodies, a circle at the follow distance, and the start of control point P.
 
     Args:
         axes: Axes to draw in. The function sets their labels and an equal scale.
@@ -70,7 +70,11 @@ def plot_energy_certificate(certificate: EnergyCertificate) -> Figure:
 
 
 def plot_certificate_trials(trials: CertificateTrials) -> Figure:
-    """Plots starts by outcome, over the region that is certified at rest."""
+    """Plots the starts of trials by outcome, over the region certified at rest.
+
+    The number after each label counts all starts of this kind. At most 2000 of them are
+    drawn.
+    """
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     axes = figure.subplots()
     certificate = trials.certificate
@@ -111,7 +115,11 @@ def plot_certificate_trials(trials: CertificateTrials) -> Figure:
 
 
 def plot_energy_balance(balance: EnergyBalance) -> Figure:
-    """Plots energy, and work of the velocity term and of D_r, along one run."""
+    """Plots energies and the clearance of P along one run.
+
+    The energies are the total energy V, the energy that the damping D_r has removed,
+    and the energy that the velocity term of the law has added.
+    """
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
     for energies, color, label in (

@@ -1,4 +1,7 @@
-"""Simulates starts inside and outside a certified set."""
+"""Simulates initial states inside and outside a certified set.
+
+A start is an initial state of the robot's control point: position and velocity.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,16 @@ from analysis.energy.energy_certificate import EnergyCertificate
 from analysis.loops.point_mass import PointMassRuns
 from systems.framework.input_error import InputError
 
-#: Number of starts per batch. The first batch depends only on the seed.
+#: Number of positions per batch. The seed alone determines the first batch.
 BATCH = 20_000
-#: Most batches. If hardly any start is outside, fewer starts than wanted are found.
+#: Largest number of batches. If hardly any starts are inside or outside the certified
+#: set, this number of batches contains fewer of them than requested.
 _MOST_BATCHES = 100
 
 
 @dataclass(frozen=True, eq=False)
 class CertificateTrials:
-    """Simulations of the certificate's own model from random starts."""
+    """Simulations of the certificate's point-mass model from random starts."""
 
     certificate: EnergyCertificate
     """The tested certificate."""
@@ -29,13 +33,13 @@ class CertificateTrials:
     outside: PointMassRuns
     """Runs from starts that are not certified."""
     certified_share: float
-    """Share of the drawn starts that are certified."""
+    """Share of the drawn starts that are certified, 0 to 1."""
     energy_share: float
-    """Share of the drawn starts that the energy alone certifies, without the clamp."""
+    """Share of the drawn starts that are certified without use of the speed limit."""
 
     @property
     def inside_collisions(self) -> int:
-        """Number of collisions from certified starts; must be 0."""
+        """Number of collisions from certified starts. A correct certificate gives 0."""
         return int(np.count_nonzero(self.inside.collided))
 
     @property
@@ -45,24 +49,27 @@ class CertificateTrials:
 
     @property
     def safe_share(self) -> float:
-        """Share of all starts that do not collide, by simulation."""
+        """Estimated share of all starts that do not collide, 0 to 1.
+
+        Certified starts count as safe. The simulations give the share of the others.
+        """
         tried = len(self.outside.starts)
         hit = self.outside_collisions / tried if tried else 0.0
         return 1.0 - (1.0 - self.certified_share) * hit
 
     @property
     def ratio(self) -> float:
-        """Share of certified starts over share of starts that do not collide."""
+        """``certified_share`` divided by ``safe_share``."""
         return self.certified_share / self.safe_share
 
     @property
     def example(self) -> NDArray[np.float64] | None:
-        """(4,) slowest start that collides, m and m/s; None if no start collides."""
+        """(4,) x, y, vx, vy of the slowest start that collides, m and m/s; or None."""
         hit = self.outside.starts[self.outside.collided]
         return hit[np.argmin(np.hypot(*hit[:, 2:].T))] if len(hit) else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Converts the result to plain values for the JSON document."""
+        """Values for the JSON document."""
         rises = np.append(self.inside.energy_rises_j, self.outside.energy_rises_j)
         return {
             "inside_starts": len(self.inside.starts),
@@ -84,8 +91,8 @@ def draw_starts(
 ) -> NDArray[np.float64]:
     """Draws random starts on the free floor.
 
-    Positions are uniform on the free floor. Velocities are uniform in the disc up to
-    the top speed.
+    Positions are uniform on the free floor. Velocities are uniform in a disc whose
+    radius is the top speed.
 
     Args:
         certificate: Certificate with the floor and the top speed.
@@ -93,7 +100,7 @@ def draw_starts(
         rng: Generator of the random numbers.
 
     Returns:
-        (n, 4) x, y, vx, vy, m and m/s; n is at most ``count``.
+        (n, 4) x, y, vx, vy in W, m and m/s; n is at most ``count``.
     """
     half = 0.5 * certificate.cell_m
     x, y = certificate.x_m, certificate.y_m
@@ -114,12 +121,12 @@ def try_certificate(
 
     Args:
         certificate: Certificate to test.
-        starts: Number of certified states, and number of states that are not certified.
-            The second number may be smaller if hardly any such states exist.
+        starts: Number of certified states to simulate, and number of other states. If
+            hardly any states of a kind exist, fewer of this kind are simulated.
         duration_s: Simulated time per state, s.
 
     Returns:
-        Results of the runs, and the certified shares of the drawn states.
+        Results of the runs, and the share of the drawn states that are certified.
 
     Raises:
         InputError: ``starts`` is below 1.

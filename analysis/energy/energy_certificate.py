@@ -5,24 +5,28 @@ control point p with velocity v. Its energy is
 
     V = M |v|^2 / 2 + K_r (|p_S - p| - d_f)^2 / 2 + U(c)
 
-The second term is the attraction to the follow distance d_f from the source at p_S.
-U(c) is the energy of the repulsion at distance c from the bodies. V cannot grow if the
-damping D_r covers the velocity term of the law
-(``analysis.energy.velocity_passivity``). The clamp of |v| to v_max only removes
-energy.
+The second term is the energy of the attraction to the follow distance d_f from the
+source at p_S. U(c) is the energy of the push at distance c from the bodies. The sum of
+both terms is the potential energy W(p).
 
-For each body, E(p) is the lowest energy level over which any path from p to contact
-with the body must climb. Each of two conditions excludes contact with a body:
+The damping D_r of the attraction removes energy. V cannot grow if it removes at least
+the energy that the velocity term of the law adds
+(``analysis.energy.velocity_passivity``). The limit of |v| to the top speed v_max only
+removes energy.
 
-- The energy is too low: V < E(p).
-- Every path to contact crosses a place where even the top speed does not suffice. There
-  M v_max^2 / 2 < E - W, with W the potential energy at that place.
+Every path from p to contact with a body has a largest value of W. The escape energy
+E(p) is the smallest of these largest values over all paths. Each of two conditions
+excludes contact with the body:
 
-An initial state is certified if one of the conditions holds for each body.
+- The energy at the start is too low: V < E(p).
+- Every path from p to contact crosses a place q from which even a robot at top speed
+  cannot reach contact: W(q) + M v_max^2 / 2 < E(q).
 
-E is computed on a grid, from bounds of W over whole cells. The distances from the
-source and from a body change by no more than p moves, and U decreases with c. The
-result therefore also holds between the grid points.
+An initial state is certified if, for each body, one of the conditions is satisfied.
+
+E is computed on a grid of cells, from bounds of W over whole cells. If p moves by some
+distance, the distances from the source and from a body change by no more than that, and
+U decreases with c. Therefore, the bounds are valid at all points of a cell.
 """
 
 from __future__ import annotations
@@ -45,9 +49,9 @@ from analysis.loops.point_mass import PointMass, VelocityTermModel, point_mass
 from diagrams import Scenario
 from systems.framework.input_error import InputError
 
-#: Width of the analyzed floor around start, source and obstacles, m.
+#: Width of the analyzed floor around the start and the centers of all bodies, m.
 MARGIN_M = 1.5
-#: Most cells of the grid. More cells take minutes.
+#: Largest number of cells of the grid. A calculation with more cells takes minutes.
 MOST_CELLS = 4_000_000
 
 
@@ -55,18 +59,18 @@ MOST_CELLS = 4_000_000
 class EnergyCertificate:
     """Result of the energy certificate: escape energies and certified cells on a grid.
 
-    The escape energy E of a cell and a body is the least energy that a path from the
-    cell to contact with the body needs. P is the robot's control point.
+    The escape energy E of a cell and a body is the least energy with which a path from
+    the cell to contact with the body is possible. P is the robot's control point.
     """
 
     scenario: Scenario
     """Scenario with the start, the world and the law."""
     model: PointMass
-    """Point-mass model that the certificate applies to."""
+    """Point-mass model to which the certificate applies."""
     passivity: VelocityTermPassivity
-    """Whether damping covers the velocity term."""
+    """Comparison of the power of the velocity term with that of the damping."""
     contact_m: float
-    """Distance from P to a body below which P is in contact, m."""
+    """Distance from a body up to which P is in contact with the body, m."""
     cell_m: float
     """Side of a cell, m."""
     x_m: NDArray[np.float64]
@@ -76,36 +80,46 @@ class EnergyCertificate:
     potential_j: NDArray[np.float64]
     """(nx, ny) upper bound of the potential energy in each cell, J."""
     free: NDArray[np.bool_]
-    """(nx, ny) whether a cell is not completely in contact."""
+    """(nx, ny) whether a cell has points at which P is not in contact."""
     escape_j: NDArray[np.float64]
-    """(bodies, nx, ny) lower bound of E, J; meaningless for cells in contact."""
+    """(bodies, nx, ny) lower bound of E, J. It has no meaning in cells that are not
+    ``free``."""
     any_speed: NDArray[np.bool_]
-    """(bodies, nx, ny) whether no allowed speed leads from a cell to contact."""
+    """(bodies, nx, ny) whether no motion from a cell leads to contact with the body, at
+    any speed up to the top speed."""
 
     @property
     def term(self) -> VelocityTermModel:
-        """Name of the velocity term that the certificate covers."""
+        """Velocity term with which the certificate is valid.
+
+        It is ``none`` if the damping does not remove the energy that the term of the
+        scenario can add. The certificate is then valid only for a law without this
+        term.
+        """
         if not self.passivity.covered:
             return "none"
         return "printed" if self.passivity.velocity_term == "printed" else "closing"
 
     @property
     def contact_energy_j(self) -> float:
-        """Least energy at contact, J. States with less energy never collide."""
+        """Least escape energy on the free floor, J. States with less never collide."""
         return float(self.escape_j[:, self.free].min())
 
     @property
     def rest_share(self) -> float:
-        """Share of the free floor with starts certified at rest."""
+        """Share of the free floor where a start at rest is certified, 0 to 1."""
         return float(np.mean(np.isfinite(self.largest_speed()[self.free])))
 
     @property
     def any_speed_share(self) -> float:
-        """Share of the free floor with starts certified at any allowed speed."""
+        """Share of the free floor where starts at all allowed speeds are certified."""
         return float(np.mean(np.all(self.any_speed[:, self.free], axis=0)))
 
     def largest_speed(self) -> NDArray[np.float64]:
-        """(nx, ny) largest certified speed, m/s; NaN if not even rest is certified."""
+        """Returns the (nx, ny) largest certified speed at a start in each cell, m/s.
+
+        It is NaN in cells where not even a start at rest is certified.
+        """
         top = self.model.top_speed_m_s
         spare = self.escape_j - self.potential_j
         speed = np.sqrt(2.0 * np.maximum(spare, 0.0) / self.model.mass_kg)
@@ -121,7 +135,7 @@ class EnergyCertificate:
 
         Args:
             states: (n, 4) x, y, vx, vy of the robot's control point, m and m/s.
-            clamp: Whether the proof may use the speed limit as well as the energy.
+            clamp: Whether the proof may use the speed limit in addition to the energy.
 
         Returns:
             (n,) True for certified states.
@@ -141,7 +155,7 @@ class EnergyCertificate:
 
     @property
     def start_certified(self) -> bool | None:
-        """Whether the scenario's own start is certified; None if bodies move."""
+        """Whether the start of the scenario is certified; None if bodies move."""
         if moving_bodies(self.scenario):
             return None
         return bool(self.certified([[*self.model.p_WP, 0.0, 0.0]])[0])
@@ -182,7 +196,7 @@ def certify_energy(
         cell_m: Side of a grid cell, m. Finer cells certify more states.
         contact_m: Distance of the robot's control point from a body that counts as
             contact, m. None: the least range of the sensors.
-        velocity_term: Velocity term of the law. None: that of the scenario.
+        velocity_term: ``printed`` or ``closing``. None: that of the scenario.
 
     Returns:
         The certificate.

@@ -1,6 +1,8 @@
-"""Computes the energy levels that paths to contact must reach, on a grid of cells.
+"""Computes escape energies on a grid of cells.
 
-``analysis.energy.energy_certificate`` explains what these levels prove.
+Every path from a cell to contact with a body has a largest potential energy. The escape
+energy of the cell is the smallest of these values over all paths. Module
+``analysis.energy.energy_certificate`` explains what escape energies prove.
 """
 
 from __future__ import annotations
@@ -33,9 +35,9 @@ def cell_bounds(
 
         1. (n,) least potential in each cell, J.
         2. (n,) largest potential in each cell, J.
-        3. (bodies, n) least energy at contact with each body, J. If a cell contains no
-           point of contact with the body, the energy is infinite.
-        4. (n,) whether the whole cell is in contact.
+        3. (bodies, n) least potential at the distance ``contact_m`` from each body, J.
+           If no point of a cell has this distance from the body, it is infinite.
+        4. (n,) whether all points of the cell are in contact with a body.
     """
     radius = cell_m / math.sqrt(2.0)
     r = np.hypot(*(points - model.p_WS).T)
@@ -59,7 +61,10 @@ def cell_bounds(
 
 
 def border_cells(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Marks the cells along the border, where paths may leave the grid and return."""
+    """Marks the cells along the border, where paths may leave the grid and return.
+
+    ``cells`` is any (nx, ny) array. The result has the same shape.
+    """
     border = np.ones(cells.shape, dtype=bool)
     border[1:-1, 1:-1] = False
     return border
@@ -69,19 +74,20 @@ def border_cells(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def climb(
     lower: NDArray[np.float64], seeds: NDArray[np.float64], blocked: NDArray[np.bool_]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the lowest energy over which paths from each cell to contact must climb.
+    """Computes the escape energy of each cell for contact with one body.
 
-    The algorithm is Dijkstra's, with the largest energy along a path instead of the
-    sum. Cells are settled in ascending order of their levels. Paths may go to all eight
-    neighbors of a cell.
+    The algorithm is Dijkstra's. The cost of a path is its largest energy instead of a
+    sum. Cells are settled in ascending order of their escape energies. Paths may go to
+    all eight neighbors of a cell.
 
     Args:
         lower: (nx, ny) least potential in each cell, J.
         seeds: (nx, ny) energy at contact within the cell, J; infinite without contact.
-        blocked: (nx, ny) cells that are completely in contact. No path crosses them.
+        blocked: (nx, ny) whether all points of a cell are in contact. No path crosses
+            these cells.
 
     Returns:
-        (nx, ny) levels, J; infinite if no path leads to contact.
+        (nx, ny) escape energies, J; infinite if no path leads to contact.
     """
     nx, ny = lower.shape
     level = np.full((nx, ny), np.inf)

@@ -1,16 +1,21 @@
 """Energy that a velocity term feeds into the loop, compared with the damping D_r.
 
-A velocity term is the dependence of the law's force f(c, s) on the speed s. It adds the
-force g = f(c, s) - f(c, 0) along u, away from the obstacle. The robot's control point
-has the velocity v. For a body at rest, |u.v| <= s <= |v|, because the nearest point of
-a convex body moves no faster than the control point. Hence the power of g is at most L
-|v|^2. L is the largest |g|/s for the sign of g that adds energy:
+The law pushes the robot away from an obstacle with the force f(c, s), where c is the
+distance and s the relative speed of the obstacle. Its velocity term is the additional
+force g = f(c, s) - f(c, 0). It acts along the unit vector u, away from the obstacle.
+The robot's control point has the velocity v.
 
-- g > 0 while the robot moves away (printed term only)
-- g < 0 while the robot approaches
+For a body at rest, s <= |v|, because the vector to the nearest point of a convex body
+changes no faster than the control point moves. If L is the largest value of |g|/s, the
+power of g is therefore at most |g| |v| <= L |v|^2. Only values of g that add energy
+count in L:
 
-If L <= D_r, the whole loop dissipates energy. All conclusions from its energy function
-without the velocity term then remain valid.
+- g > 0, which adds energy while the robot moves away (``printed`` term only)
+- g < 0, which adds energy while the robot approaches
+
+The damping of the attraction removes the power D_r |v|^2. If L <= D_r, the velocity
+term cannot make the kinetic plus potential energy grow. Conclusions from this energy
+are then valid for a law with this term, too.
 """
 
 from __future__ import annotations
@@ -32,11 +37,12 @@ class VelocityTermPassivity:
     """Bounds of a velocity term, compared with the damping of the attraction."""
 
     velocity_term: str
-    """``printed`` or ``closing``."""
+    """Definition of the speed s: ``printed``, the rate of change of the vector to the
+    obstacle, or ``closing``, the speed of approach."""
     rise_n_s_m: float
-    """Largest (f(c, s) - f(c, 0))/s, N s/m. If the force never increases with s: 0."""
+    """Largest (f(c, s) - f(c, 0))/s, N s/m; at least 0."""
     fall_n_s_m: float
-    """Largest (f(c, 0) - f(c, s))/s, N s/m. If the force never decreases with s: 0."""
+    """Largest (f(c, 0) - f(c, s))/s, N s/m; at least 0."""
     bodies: int
     """Largest number of bodies that push at the same time."""
     attraction_damping_n_s_m: float
@@ -44,7 +50,7 @@ class VelocityTermPassivity:
 
     @property
     def largest_injection_n_s_m(self) -> float:
-        """Largest power of the velocity term over |v|^2, N s/m."""
+        """Largest power that the velocity term can add, divided by |v|^2, N s/m."""
         harm = self.fall_n_s_m
         if self.velocity_term == "printed":
             harm = max(harm, self.rise_n_s_m)
@@ -52,12 +58,12 @@ class VelocityTermPassivity:
 
     @property
     def passive_alone(self) -> bool:
-        """Whether the term never adds energy."""
+        """Whether the velocity term never adds energy."""
         return self.largest_injection_n_s_m <= 0.0
 
     @property
     def covered(self) -> bool:
-        """Whether D_r dissipates at least the energy that the term can add."""
+        """Whether D_r removes at least the energy that the velocity term can add."""
         return self.largest_injection_n_s_m <= self.attraction_damping_n_s_m
 
     def to_dict(self) -> dict[str, Any]:
@@ -78,13 +84,14 @@ class EnergyBalance:
     times_s: NDArray[np.float64]
     """(n,) times, s."""
     energies_j: NDArray[np.float64]
-    """(n,) energies V: kinetic plus potential."""
+    """(n,) energies V, J: kinetic plus potential."""
     injected_j: NDArray[np.float64]
-    """(n,) work of the velocity term so far. If negative, the term removed energy."""
+    """(n,) work of the velocity term from the start to each time, J. A negative value
+    means that the term has removed energy."""
     dissipated_j: NDArray[np.float64]
-    """(n,) energy that D_r has dissipated so far."""
+    """(n,) energy that the damping D_r has removed from the start to each time, J."""
     clearances_m: NDArray[np.float64]
-    """(n,) distances of P from the nearest body."""
+    """(n,) distances of the control point P from the nearest body, m."""
 
     def to_dict(self) -> dict[str, Any]:
         """Values for the JSON document."""
@@ -103,19 +110,20 @@ def velocity_term_passivity(
 ) -> VelocityTermPassivity:
     """Computes how much power the velocity term of a law can add.
 
-    A velocity term is the dependence of the law's force on the speed of the obstacle.
+    The velocity term is the part of the law's force that depends on the relative speed
+    of the obstacle.
 
     Args:
         scenario: Scenario with law, gains and bodies.
-        velocity_term: ``printed`` or ``closing``. With None: the scenario's.
+        velocity_term: ``printed`` or ``closing``. None: that of the scenario.
 
     Returns:
-        Largest slopes of the push in the obstacle's speed, and the damping of the
+        Largest ratios of the velocity term to the speed, and the damping of the
         attraction.
 
     Raises:
-        InputError: The law is not known.
-        ValueError: The law has no radial force.
+        InputError: The law is not known or has no radial force, or the scenario adds
+            the pushes of more than three bodies.
     """
     model = point_mass(scenario)
     increments = model.law.increments_n[:, 1:]
@@ -135,20 +143,21 @@ def energy_balance(
 ) -> EnergyBalance:
     """Computes the energies along a run of the point mass from the scenario's start.
 
-    A velocity term is the dependence of the law's force on the speed of the obstacle.
+    The velocity term is the part of the law's force that depends on the relative speed
+    of the obstacle.
 
     Args:
         scenario: Scenario with law, gains, bodies and start.
         duration_s: Simulated time, s.
-        velocity_term: ``printed`` or ``closing``. With None: the scenario's.
+        velocity_term: ``printed`` or ``closing``. None: that of the scenario.
 
     Returns:
-        Energy, work of the velocity term, and energy that the damping dissipates, at
-        every step.
+        Energy, work of the velocity term, and energy that the damping removes, at every
+        step.
 
     Raises:
-        InputError: The law is not known.
-        ValueError: The law has no radial force.
+        InputError: The law is not known or has no radial force, or the scenario adds
+            the pushes of more than three bodies.
     """
     passivity = velocity_term_passivity(scenario, velocity_term)
     model = point_mass(scenario)

@@ -1,1 +1,1 @@
-"""Laws as forces over distance: curves, push and pull, and the head-on approach."""
+"""Models of the control loop: equilibria, linear models, margins, forces of laws."""

@@ -10,7 +10,7 @@ from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoD
 
 
 def seed(values: Any) -> Any:
-    """(n,) values as AutoDiffXd, each an independent variable."""
+    """Returns (n,) values as AutoDiffXd. Each value is an independent variable."""
     column: Any = np.asarray(values, dtype=float)
     return InitializeAutoDiff(column).ravel()
 

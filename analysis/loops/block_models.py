@@ -1,9 +1,9 @@
-"""Closed loop joined from blocks that are linearized alone.
+"""Linear model of the closed loop, joined from blocks that are linearized alone.
 
 The joined blocks give the matrix of one control period. AutoDiff through the whole
-diagram gives the same matrix in another way. Both ways use the same blocks. Wiring,
-order of updates, and integration of the joined system are independent, so that each way
-checks the other.
+diagram (``IdealLoop.period_derivatives``) gives the same matrix in another way. Both
+ways use the same blocks, but connect, update and integrate them independently.
+Therefore, each way checks the other.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from analysis.loops.ideal_loop import IdealLoop
 from analysis.loops.linear_models import LinearModel
 from diagrams.running.simulation import simulator_config
 
-#: Suffix of a signal's name for its value after the control update.
+#: Suffix of a signal's name if the signal is the value after the control update.
 AFTER = "_after"
 
 
 def sampled_blocks(
     loop: IdealLoop, state: NDArray[np.float64], time_s: float = 0.0
 ) -> tuple[LinearModel, ...]:
-    """Linearizes every block that has inputs, each block alone, over one period.
+    """Linearizes each block that has inputs, alone, over one control period.
 
-    At the control update that begins a period, sampled blocks read each other's outputs
-    before the update. Continuous blocks read outputs after the update, because these
-    are held over the period. A block that feeds a continuous block therefore has some
-    outputs twice: before and after the update. ``state`` is the (n,) operating point
-    just before the update.
+    A control update begins the period. Sampled blocks read the outputs of other blocks
+    as they are before the update. Continuous blocks read outputs as they are after the
+    update, because these values are held over the period. The model of a block that
+    feeds a continuous block therefore has some outputs twice: before and after the
+    update. ``state`` (n,) is the state of the loop just before the update.
     """
     after = loop.period_map(state, time_s)
     continuous = [
@@ -78,7 +78,7 @@ def _ports(block: Any, kind: str) -> list[Any]:
 def _input_values(
     loop: IdealLoop, role: str, state: NDArray[np.float64], time_s: float
 ) -> list[NDArray[np.float64]]:
-    """Values at the input ports of a block, in the diagram at a given state."""
+    """Values at the input ports of a block when the diagram is at ``state``."""
     block = loop.block(role)
     own = block.GetMyContextFromRoot(loop.context(state, time_s))
     return [port.Eval(own).copy() for port in _ports(block, "input")]
@@ -95,13 +95,17 @@ def block_model(
     held: Collection[str] = (),
     read_after: bool = False,
 ) -> LinearModel:
-    """Linearizes one sampled block, given as LeafSystem_[AutoDiffXd], over one period.
+    """Linearizes one sampled block over one control period.
 
-    Inputs and outputs have the names ``port[element]``, with the names of the ports of
-    ``ports``, which is ``twin`` by default. ``state`` (n,) is that just before the
-    update, and ``values`` are those at the input ports. Continuous blocks read the
-    output ports ``held`` after the update. ``read_after`` says whether this block reads
-    its inputs after the update of other blocks.
+    ``twin`` is the block as LeafSystem_[AutoDiffXd]. ``state`` (n,) is its state before
+    the control update, and ``values`` are the values at its input ports. The signals of
+    the model have the names ``port[element]``. ``ports`` is the block that has the
+    names of the ports, by default ``twin``.
+
+    Each output port whose name is in ``held`` is read by a continuous block. The model
+    has its signals twice: before the update, and after the update with the suffix
+    AFTER. If ``read_after`` is true, this block reads the outputs of other blocks after
+    the update, and its inputs have this suffix.
     """
     ports = ports or twin
     count = len(state)
@@ -149,7 +153,10 @@ def _context(block: Any, time_s: float, state: Any) -> Any:
 
 
 def sampled_twin(loop: IdealLoop, role: str) -> Any:
-    """Returns a continuous block as an AutoDiffXd block, discrete over a period."""
+    """Returns a continuous block as an AutoDiffXd block in discrete time.
+
+    The time step is the control period.
+    """
     if role not in loop.sampled_twins:
         config = simulator_config(loop.scenario)
         sampled = DiscreteTimeApproximation(loop.block(role), loop.tick_s, config)
@@ -171,9 +178,9 @@ def join_blocks(
 ) -> LinearModel:
     """Joins linearized blocks: connects each output to all inputs of the same name.
 
-    The blocks have the same period. The result has all their states in the order of
-    ``state_names``. The signals ``inputs`` are fed from outside, and the signals
-    ``outputs`` are returned.
+    All blocks have the same period. The joined model has all their states, in the order
+    of ``state_names``. Its inputs are the block inputs with the names ``inputs``. Its
+    outputs are the block outputs with the names ``outputs``.
     """
     import control
 

@@ -1,9 +1,13 @@
-"""The burst cycle as a periodic system: for example 0.5 s sound and 1.5 s silence.
+"""The loop as a periodic system, while the source alternates between sound and silence.
 
-During the silence, the tracker holds the target in the world frame W, holds it relative
-to the robot, or moves it with its last velocity. The product of the one-period matrices
-of a cycle maps deviations before the cycle to deviations after the cycle. Its
-eigenvalues are the multipliers.
+A burst cycle is one period of the source, for example 0.5 s of sound and 1.5 s of
+silence. During the silence, the tracker holds the target in the world frame W, holds it
+relative to the robot, or moves it at its last estimated velocity.
+
+For each control period, a matrix maps small deviations from an equilibrium at the
+beginning of the period to deviations at the end. The product of these matrices over a
+cycle maps deviations before the cycle to deviations after it. The eigenvalues of the
+product are the multipliers of the cycle.
 """
 
 from __future__ import annotations
@@ -30,17 +34,19 @@ Hold = Literal["world", "robot", "motion"]
 #: How the tracker can hold the target during the silence.
 HOLDS: tuple[Hold, ...] = ("world", "robot", "motion")
 
-#: A mode whose share in the response is below this part of the largest is left out.
+#: A mode is left out if its share in the response is below this fraction of the largest
+#: share.
 _NO_SHARE = 1e-14
 #: Velocity that the kick adds to the virtual mass, m/s.
 _KICK_M_S = 1e-5
-#: Cycles at rest before the linearization, in which the tracker's memory settles.
+#: Number of cycles at rest before the linearization. In this time, the memory of the
+#: tracker settles.
 _SETTLING_CYCLES = 3
 
 
 @dataclass(frozen=True)
 class BurstCycle:
-    """Multipliers of P's motion over one cycle of the sound, about a resting point."""
+    """Multipliers of the motion of P over one cycle, about an equilibrium at rest."""
 
     hold: Hold
     """How the tracker holds the target during the silence."""
@@ -49,17 +55,18 @@ class BurstCycle:
     period_s: float
     """Duration of a cycle, s."""
     along: NDArray[np.complex128]
-    """Multipliers along the line to the source, largest first. Neutral multipliers of a
-    continuum of equilibria are left out."""
+    """Multipliers of motions along the line to the source, largest first. Multipliers
+    equal to 1, which belong to a continuum of equilibria, are left out."""
     across: NDArray[np.complex128]
-    """Multipliers across the line to the source, without neutral ones."""
+    """Multipliers of motions across this line, in the same form."""
     matrices: NDArray[np.float64] = field(repr=False)
-    """(ticks, n, n) matrices of the whole state over each control period of a cycle."""
+    """(ticks, n, n) matrices of the whole state, one for each control period of a
+    cycle."""
     loop: IdealLoop = field(repr=False)
     state: NDArray[np.float64] = field(repr=False)
     """(n,) state at the beginning of a cycle."""
     point: OperatingPoint = field(repr=False)
-    """The same equilibrium with a sound without pauses."""
+    """The same equilibrium for a sound without pauses."""
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
@@ -80,13 +87,13 @@ class BurstCycle:
 
 @dataclass(frozen=True)
 class BurstRun:
-    """Simulated motion over many cycles after a small initial velocity."""
+    """Simulated motion over many cycles after a small change of velocity."""
 
     hold: Hold
     factor: float
     """Fitted growth factor per cycle, to compare with the largest |multiplier|."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,) times of all control periods, s."""
+    """(n,) times of the ends of the control periods, s."""
     offset_m: NDArray[np.float64] = field(repr=False)
     """(n,) deviation of P from the equilibrium in the direction of the kick, m."""
 
@@ -101,11 +108,12 @@ def burst_cycle(
 ) -> BurstCycle:
     """Computes the multipliers at the equilibrium where the robot follows the source.
 
-    The source alternates between sound and silence, by default as long as in the
-    scenario. A multiplier is an eigenvalue of the map over one cycle of both. Sensors
-    are taken as exact, and bodies as at rest. ``point`` is the equilibrium, if it is
-    already known. Raises InputError if the cycle is not a whole number of control
-    periods or has no sound, or if there is no stable equilibrium.
+    The source alternates between ``on_s`` of sound and ``gap_s`` of silence, by default
+    those of the scenario. A multiplier is an eigenvalue of the map over one such cycle.
+    The calculation assumes exact sensors and bodies at rest. ``point`` is the
+    equilibrium, if the caller already knows it. Raises InputError if the cycle is not a
+    whole number of control periods or has no sound, or if there is no stable
+    equilibrium.
     """
     point = point or follow_equilibrium(scenario)
     sound = scenario.source.sound
@@ -145,7 +153,10 @@ def _with_bursts(scenario: Scenario, hold: Hold, on: float, period: float) -> Sc
 
 
 def _settled(loop: IdealLoop, point: OperatingPoint, ticks: int) -> NDArray[np.float64]:
-    """State at rest after the robot has listened for some cycles."""
+    """State (n,) of the robot at rest after ``_SETTLING_CYCLES`` cycles of the sound.
+
+    ``ticks`` is the number of control periods per cycle.
+    """
     x, y = control_point(
         (*point.p_WP, point.theta_WB), -loop.scenario.only.robot.control_point_m
     )
@@ -181,8 +192,8 @@ def _multipliers(
             D=np.zeros((1, 1)),
         )
     )
-    # Rounding errors, which depend on the machine, may leave states of the other
-    # direction in the model. Their share in the response is negligible.
+    # Rounding errors may leave modes of the other direction in the model. Their share
+    # in the response is negligible.
     poles, modes = np.linalg.eig(line.A)
     seen, moved = (line.C @ modes)[0], np.linalg.solve(modes, line.B)[:, 0]
     share = np.abs(seen * moved)
@@ -195,8 +206,8 @@ def simulate_burst_cycle(
 ) -> BurstRun:
     """Simulates many cycles of sound and silence after a small kick to the robot.
 
-    The kick changes the velocity of the virtual mass. The fit of the growth factor
-    leaves out the first quarter of the cycles.
+    The kick changes the velocity of the virtual mass in one direction. The fit of the
+    growth factor leaves out the first quarter of the cycles.
     """
     loop, point = cycle.loop, cycle.point
     axis = point.axes[DIRECTIONS.index(direction)]
@@ -218,8 +229,8 @@ def simulate_burst_cycle(
 def _dominant_factor(samples: NDArray[np.float64]) -> float:
     """|z| of the dominant mode or pair of modes in equally spaced samples.
 
-    The fit is x[n + 2] = a x[n + 1] + b x[n]. Each row is weighted by the inverse of
-    its size.
+    The samples are fitted by x[n + 2] = a x[n + 1] + b x[n]. Each equation is weighted
+    by the inverse of the norm of (x[n + 1], x[n]).
     """
     rows = np.column_stack([samples[1:-1], samples[:-2]])
     size = np.linalg.norm(rows, axis=1)

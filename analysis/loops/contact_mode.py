@@ -1,13 +1,15 @@
-"""Contact mode: largest stable stiffness of an obstacle over motor lag and latency.
+"""Contact mode: largest stable stiffness of the motion straight towards an obstacle.
 
-Near an obstacle, the stiffnesses of the obstacle's and the attraction's spring add. The
-damping is that of the attraction alone. Motor lag, sample period, and age of the echo
-reduce the effect of the damping, and so limit the stiffness.
+The push of the law acts as a spring between the robot and a nearby obstacle. Its
+stiffness adds to that of the attraction. The damping is that of the attraction alone.
+Motor lag, sample period, and age of the echo reduce the effect of the damping, and so
+limit the stiffness. In this module, "latency" is the age of the echo.
 
 The model from acceleration to motion uses the blocks of the diagram. Drake linearizes
-the plant and samples it exactly. AutoDiff linearizes the wheel command. The repulsion's
-dependence on speed (velocity term) is left out. Over an oscillation about an obstacle
-at rest, the printed velocity terms have no damping on average.
+the plant and converts it exactly to sampled time. AutoDiff linearizes the block that
+commands the wheels. The velocity term, which is the part of the push that depends on
+speed, is left out. With the definition of speed in the papers, this term has no damping
+on average over an oscillation in front of an obstacle at rest.
 """
 
 from __future__ import annotations
@@ -38,9 +40,9 @@ from systems.base.wheel_speed_command import WheelCommand_
 _STIFFNESSES = np.geomspace(1e-3, 1e5, 400)
 #: A spectral radius above 1 by less than this is a rounding error.
 _ROUNDING = 1e-11
-#: Motor lags of the table.
+#: Motor lags in the tables of ``ContactLimits``, s.
 _MOTOR_LAGS_S = (0.01, 0.02, 0.05, 0.1, 0.2)
-#: Latencies of the table, in control periods.
+#: Latencies in the tables of ``ContactLimits``, in control periods.
 _LATENCY_TICKS = (0, 1, 2, 3, 4)
 
 
@@ -52,16 +54,16 @@ def motion_chain(
 ) -> LinearModel:
     """Returns the model from the law's acceleration to the robot's forward motion.
 
-    The model is linearized at rest. Input and outputs are the values before the control
-    update that begins the period. The model has the controllable and observable states
-    only.
+    The model is linearized at rest. Input and outputs are the values just before the
+    control update that begins a period. The model has only the controllable and
+    observable states.
 
     - Input: ``acceleration``, m/s^2.
     - Outputs: position of the control point P, m, and velocity of the virtual mass,
       m/s.
 
-    ``motor_lag_s`` and ``period_s`` replace values of the scenario. Raises InputError
-    if the wheels can slip (``plant.friction`` is set).
+    ``motor_lag_s`` and ``period_s``, the control period, replace values of the
+    scenario. Raises InputError if the wheels can slip (``plant.friction`` is set).
     """
     plant = scenario.only.plant
     require_rolling(plant)
@@ -94,7 +96,7 @@ def _chain(
     )
     B = np.concatenate([sampled.B() @ push[w], push[v]])[:, None]
     C = np.zeros((2, len(A)))
-    C[0, 0] = C[1, -2] = 1.0  # at heading 0, x of P differs from x of B by a constant
+    C[0, 0] = C[1, -2] = 1.0  # at heading 0, P and the axle differ in x by a constant
     whole = LinearModel(
         name="motion of P",
         A=A,
@@ -110,9 +112,10 @@ def _chain(
 
 
 def delayed_output(model: LinearModel, output: str, ticks: int) -> LinearModel:
-    """Returns the model with one of its outputs delayed by 0 or more whole periods.
+    """Returns the model with the output named ``output`` delayed by ``ticks`` periods.
 
-    Each period of delay adds a state: ``<output>_1`` and so on.
+    ``ticks`` is 0 or more. Each period of delay adds a state: ``<output>_1``,
+    ``<output>_2``, and so on.
     """
     if ticks == 0:
         return model
@@ -144,14 +147,17 @@ def contact_model(
 ) -> LinearModel:
     """Returns the sampled model of the robot's motion straight towards an obstacle.
 
-    ``stiffness_n_m`` is the sum of all springs, those of attraction and obstacle. They
-    act on a position that is ``latency_ticks`` control periods old. This is 0 in the
-    diagram, where an echo drives the wheels in the same period.
-    ``approach_damping_n_s_m`` is the slope of the repulsion in the obstacle's speed.
-    This speed is the mean rate of the position over one period. The result is valid
-    only while the obstacle comes nearer. Damping, motor lag and period replace values
-    of the scenario. The signals and states are those of ``motion_chain``, then the
-    delayed positions, m.
+    ``stiffness_n_m`` is the sum of the stiffnesses of attraction and push. Both forces
+    depend on a position that is ``latency_ticks`` control periods old. In the diagram,
+    this latency is 0: an echo affects the wheels in the same period.
+
+    ``approach_damping_n_s_m`` is the derivative of the push by the speed of approach.
+    This speed is the mean rate of the position over the last period. With a value other
+    than 0, the model is valid only while the robot and the obstacle approach.
+
+    ``damping_n_s_m``, ``motor_lag_s`` and ``period_s`` replace values of the scenario.
+    The model has the signals of ``motion_chain``. Its states are those of
+    ``motion_chain``, followed by the delayed positions, m.
     """
     damping = damping_n_s_m
     if damping is None:
@@ -185,10 +191,9 @@ def largest_contact_stiffness(
 ) -> float:
     """Returns the largest stable stiffness of the motion towards an obstacle, N/m.
 
-    The stiffness is the sum of all springs: those of the attraction and of the
-    obstacle. It is 0 if no spring is stable, for example without damping. It is
-    infinite if all springs up to 1e5 N/m are stable. The options are those of
-    ``contact_model``.
+    The stiffness is the sum of the stiffnesses of attraction and push. It is 0 if no
+    stiffness is stable, for example without damping. It is infinite if all stiffnesses
+    up to 1e5 N/m are stable. ``options`` are those of ``contact_model``.
     """
 
     def excess(stiffness: float) -> float:
@@ -206,7 +211,10 @@ def largest_contact_stiffness(
 
 @dataclass(frozen=True)
 class ContactLimits:
-    """Largest gains without oscillation before an obstacle at rest, as tables."""
+    """Largest gains for which the motion towards an obstacle at rest is stable.
+
+    The rows of the tables are motor lags, and the columns are latencies of the echo.
+    """
 
     motor_lags_s: tuple[float, ...]
     """Motor lags of the rows, s."""
@@ -216,23 +224,25 @@ class ContactLimits:
     """(rows, columns) largest stiffness K_0 of the conventional law, N/m. A negative
     value means that the attraction alone is too stiff."""
     reference_stiffness_n_m: NDArray[np.float64]
-    """(rows, columns) largest k_ref of the active law, from its largest slope, N/m."""
+    """(rows, columns) largest gain k_ref of the active law, N/m. The law is at the
+    distance at which it is stiffest, and its stiffness is proportional to k_ref."""
     today: tuple[float, int]
-    """Motor lag, s, and latency, in control periods, of the scenario."""
+    """Motor lag of the scenario, s, and its latency in control periods."""
     stiffness_today_n_m: float
     """K_0 of the scenario, N/m."""
     reference_stiffness_today_n_m: float
     """k_ref of the scenario, N/m."""
     active_slope_today_n_m: float
-    """Largest slope -df/dc of the active law with the scenario's gains, N/m."""
+    """Largest stiffness -df/dc of the active law with the scenario's gains, N/m."""
     tick_s: float
+    """Control period, s."""
 
 
 def contact_limits(scenario: Scenario) -> ContactLimits:
-    """Computes the largest stable stiffness before an obstacle for two control laws.
+    """Computes the largest stable gains of the conventional and of the active law.
 
-    The results are tables over motor lag (rows) and latency (columns), without the
-    stiffness of the attraction. The motor lag of the scenario is one of the rows.
+    The gains follow from the largest stable stiffness minus the stiffness of the
+    attraction. The motor lag of the scenario is one of the rows of the tables.
     """
     lags = sorted({*_MOTOR_LAGS_S, scenario.only.plant.motor_lag_s})
     total = np.array(

@@ -1,10 +1,13 @@
 """Delay margin of the sampled loop, exact to fractions of a control period.
 
-For a delay of n control periods plus a fraction e, the delayed signals become
-additional states of the one-period map. Bisection finds the delay at which the spectral
-radius of this map is 1. The method is semi-discretization, but without its
-approximation: signals are constant between control updates, and a matrix exponential
-gives the motion of the plant in between.
+One matrix maps the state of the loop over one control period. Delayed signals become
+additional states of this matrix. A delay may be any number of periods plus a fraction
+of a period. A root search finds the delay at which the spectral radius of the matrix is
+1.
+
+The method is similar to semi-discretization, but contains no approximation: commands
+are constant between control updates, and a matrix exponential gives the motion of the
+plant in between.
 """
 
 from __future__ import annotations
@@ -29,7 +32,7 @@ DelayPlace = Literal["sensor", "wheels"]
 
 #: Places of a delay:
 #: - sensor: estimates of the source arrive later than the tracker assumes
-#: - wheels: wheel commands reach the motors later
+#: - wheels: wheel commands reach the motors later than in the diagram
 DELAY_PLACES: tuple[DelayPlace, ...] = ("sensor", "wheels")
 
 #: Largest delay margin that the search can find, s.
@@ -38,14 +41,16 @@ _LONGEST_S = 10.0
 
 @dataclass(frozen=True)
 class DelayMargin:
-    """Delay at which a loop begins to oscillate."""
+    """Smallest additional delay that makes a stable loop unstable."""
 
     at: DelayPlace
     direction: Direction
     delay_s: float
-    """Delay in addition to that of the diagram, s. Infinity: no delay destabilizes."""
+    """Delay in addition to that of the diagram, s. If no delay up to 10 s makes the
+    loop unstable: infinity."""
     frequency_rad_s: float
-    """Frequency of the oscillation, rad/s. Without an oscillation: NaN."""
+    """Frequency of the oscillation at this delay, rad/s. If the delay is infinite:
+    NaN."""
 
 
 class DelayedLoop:
@@ -60,7 +65,7 @@ class DelayedLoop:
         own = f"{at}_{direction}"
         whole = cut_model(point, at)
         (other,) = [name for name in whole.input_names if name != own]
-        # The loop of the other direction is closed. The model keeps all its states.
+        # Only the loop of this direction is cut. No state is removed from the model.
         self._cut = closed(whole, (other,))
         self._column = whole.input_names.index(own)
         self._at = at
@@ -76,7 +81,11 @@ class DelayedLoop:
         self._turn = np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
 
     def _flow(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Derivatives of the plant state by the earlier state and the wheel speeds."""
+        """Derivatives of the plant's state after some seconds of constant commands.
+
+        The two matrices are the derivatives by the initial state, and by the commanded
+        wheel speeds.
+        """
         n, m = self._B_plant.shape
         block = np.zeros((n + m, n + m))
         block[:n, :n], block[:n, n:] = self._A_plant, self._B_plant
@@ -84,7 +93,10 @@ class DelayedLoop:
         return moved[:n, :n], moved[:n, n:]
 
     def period_matrix(self, delay_s: float) -> NDArray[np.float64]:
-        """One-period map of the motion and of the delayed signals."""
+        """Returns the matrix of one control period with a delay of ``delay_s`` >= 0.
+
+        Its state consists of the states of the loop and the delayed signals.
+        """
         ticks, part = divmod(delay_s, self._tick_s)
         late = int(ticks)
         return (self._wheel_delay if self._at == "wheels" else self._sensor_delay)(
@@ -92,7 +104,11 @@ class DelayedLoop:
         )
 
     def _wheel_delay(self, late: int, part: float) -> NDArray[np.float64]:
-        """One-period map if the wheels hold an older command for ``part`` seconds."""
+        """Matrix of one period for wheel commands that arrive late.
+
+        The delay is ``late`` periods plus ``part`` seconds. In the first ``part``
+        seconds of each period, the wheels still follow the older command.
+        """
         cut, column = self._cut, self._column
         rest, _ = self._flow(self._tick_s - part)
         _, first = self._flow(part)
@@ -102,18 +118,23 @@ class DelayedLoop:
         return _with_delays(cut, cut.C[column], [(newer, late), (older, late + 1)])
 
     def _sensor_delay(self, late: int, part: float) -> NDArray[np.float64]:
-        """One-period map if hearing measures an earlier position of the robot."""
+        """Matrix of one period for estimates of the source that arrive late.
+
+        The delay is ``late`` periods plus ``part`` seconds. Hearing therefore measures
+        the position of the source relative to an earlier pose of the robot.
+        """
         cut, column = self._cut, self._column
         state, held = self._flow(self._tick_s - part)
         measured = np.zeros(len(cut.A))
         by_plant = cut.A[self._hearing, self._plant]
         measured[self._plant] = by_plant @ state
         measured += by_plant @ held @ cut.A[self._wheels]
-        # Without a delay, the tracker reads the measurement of the tick before.
+        # ``measured`` is the measurement ``part`` seconds before the end of period k.
+        # Without a delay, the tracker reads it at the start of period k + 2.
         return _with_delays(cut, measured, [(cut.B[:, column], late + 2)])
 
     def spectral_radius(self, delay_s: float) -> float:
-        """Largest |z| of a pole, without neutral poles (z = 1)."""
+        """Returns the largest |z| of all poles except neutral ones (z = 1)."""
         return self._largest(delay_s)[0]
 
     def _largest(self, delay_s: float) -> tuple[float, complex]:
@@ -123,7 +144,7 @@ class DelayedLoop:
         return abs(largest), largest
 
     def critical_frequency(self, delay_s: float) -> float:
-        """Frequency of the pole with the largest |z|, rad/s."""
+        """Returns the frequency of the pole with the largest |z|, rad/s."""
         return abs(float(np.angle(self._largest(delay_s)[1]))) / self._tick_s
 
 
@@ -132,9 +153,10 @@ def _with_delays(
     row: NDArray[np.float64],
     columns: list[tuple[NDArray[np.float64], int]],
 ) -> NDArray[np.float64]:
-    """Matrix of x+ = A x + sum of b_i y[k - n_i], y = row x, with delays n_i.
+    """Matrix of the system x[k + 1] = A x[k] + sum of b_i y[k - n_i], with y = row x.
 
-    The model keeps only its controllable and observable states.
+    ``columns`` has the pairs (b_i, n_i). The past values of y are states of the matrix,
+    in addition to the controllable and observable states of ``model``.
     """
     B = np.column_stack([column for column, _ in columns])
     part = replace(
@@ -165,7 +187,10 @@ def delay_margin(
     at: DelayPlace = "sensor",
     direction: Direction = "along",
 ) -> DelayMargin:
-    """Returns the smallest delay that makes a stable loop unstable, or infinity."""
+    """Returns the smallest additional delay that makes a stable loop unstable.
+
+    Raises InputError if the loop is unstable without this delay.
+    """
     loop = DelayedLoop(point, at, direction)
     if loop.spectral_radius(0.0) >= 1.0:
         raise InputError(

@@ -1,4 +1,4 @@
-"""Simulation of the diagram with exact sensors and an additional delay."""
+"""Simulation of the diagram with exact sensors and one additional delay."""
 
 from __future__ import annotations
 
@@ -16,29 +16,30 @@ from analysis.loops.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
 from systems.hearing.ideal_source_sensor import relative_position
 
-#: Initial velocity that starts the motion, m/s. It is far above rounding errors, and
-#: small enough for a linear motion.
+#: Change of velocity that starts the motion, m/s. The motion is far above rounding
+#: errors and still so small that it is linear.
 _KICK_M_S = 1e-6
 
 
 @dataclass(frozen=True)
 class DelayedRun:
-    """Simulated motion about an operating point after a small initial velocity."""
+    """Simulated motion about an operating point after a small change of velocity."""
 
     delay_s: float
     duration_s: float
     growth_per_s: float
     """Fitted growth rate of the envelope, 1/s; negative if the motion decays."""
     frequency_rad_s: float
+    """Fitted frequency, rad/s; 0 if the motion has fewer than three peaks."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,)"""
+    """(n,) times of the ends of the control periods, s."""
     offset_m: NDArray[np.float64] = field(repr=False)
     """(n,) deviation of P from the operating point in the direction of the kick, m."""
 
 
 @dataclass(frozen=True)
 class DelayCheck:
-    """Computed delay margin with two simulated runs, below and above the margin."""
+    """Computed delay margin, and two simulated runs with delays below and above it."""
 
     margin: DelayMargin
     below: DelayedRun
@@ -48,7 +49,7 @@ class DelayCheck:
 
     @property
     def confirmed(self) -> bool:
-        """Whether the run below decays and the run above grows."""
+        """Whether the run below the margin decays and the run above it grows."""
         return self.below.growth_per_s < 0.0 < self.above.growth_per_s
 
 
@@ -59,7 +60,10 @@ def check_delay_margin(
     *,
     duration_s: float = 300.0,
 ) -> DelayCheck:
-    """Simulates the loop with 0.95 and with 1.05 of its finite delay margin."""
+    """Simulates the loop with delays of 0.95 and 1.05 of its delay margin.
+
+    Raises InputError if the loop has no finite delay margin.
+    """
     margin = delay_margin(point, at, direction)
     if not np.isfinite(margin.delay_s):
         raise InputError(
@@ -88,10 +92,11 @@ def simulate_delayed(
 ) -> DelayedRun:
     """Simulates the diagram with one delayed signal, after a small kick to the robot.
 
-    The kick changes the velocity of the virtual mass. Both elements of the signal are
-    delayed. At rest, the motions along and across the line to the source are decoupled.
-    A kick along this line therefore shows only the loop along the line. Raises
-    InputError if the operating point moves or the delay is negative.
+    The kick changes the velocity of the virtual mass in one direction. Both elements of
+    the signal are delayed. About a point at rest, the motions along and across the line
+    to the source are decoupled. The motion after a kick in one direction therefore
+    depends only on the loop of this direction. Raises InputError if the operating point
+    moves or the delay is negative.
     """
     if point.moves:
         raise InputError(
@@ -114,7 +119,10 @@ def simulate_delayed(
 def kicked(
     point: OperatingPoint, state: NDArray[np.float64], kick_W: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Returns a copy of the state with ``kick_W``, m/s, added to the velocity."""
+    """Returns a copy of the (n,) state after a change of velocity.
+
+    ``kick_W`` (2,) in W, m/s, is added to the velocity of the virtual mass.
+    """
     names, moved = point.loop.state_names, state.copy()
     moved[[names.index(f"command.v_WP_{k}") for k in "xy"]] += kick_W
     return moved
@@ -125,7 +133,10 @@ def offsets(
     poses_WB: Sequence[NDArray[np.float64]],
     axis: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Returns (n,) deviations of P from an equilibrium along a (2,) unit vector, m."""
+    """Returns (n,) deviations of P from an equilibrium along a (2,) unit vector, m.
+
+    ``poses_WB`` are n poses x, y, theta of the robot in W, m and rad.
+    """
     x, y, theta = np.array(poses_WB).T
     epsilon = point.loop.scenario.only.robot.control_point_m
     places = np.column_stack([x + epsilon * np.cos(theta), y + epsilon * np.sin(theta)])
@@ -136,7 +147,7 @@ def offsets(
 def _wheels_late(
     point: OperatingPoint, state: NDArray[np.float64], delay_s: float, ticks: int
 ) -> list[NDArray[np.float64]]:
-    """Poses of a run in which the plant's input is cut and gets older commands."""
+    """Poses of a run in which the plant receives wheel commands ``delay_s`` late."""
     loop, tick_s = point.loop, point.loop.tick_s
     start = round(point.time_s / tick_s)
     late, part = divmod(delay_s, tick_s)
@@ -146,10 +157,11 @@ def _wheels_late(
     wheels, plant = loop.indices("command")[2:], loop.indices("plant")[:3]
     poses = []
     for k in range(start, start + ticks):
-        # Drake computes tick times as multiples too; a sum would miss the ticks.
+        # Drake's tick times are multiples of the period. Repeated additions would give
+        # slightly different times.
         now, then = k * tick_s, (k + 1) * tick_s
-        # The newest command is last. Until ``part`` has passed, the plant holds the
-        # command before the one that is due.
+        # The newest command is the last. In the first ``part`` seconds of the period,
+        # the plant still has the command before the one that is due.
         run.fix(port, sent[1] if late else sent[-1])
         run.advance(now + max(part, 1e-9))
         sent.append(run.state()[wheels])
@@ -162,7 +174,7 @@ def _wheels_late(
 def _hearing_late(
     point: OperatingPoint, state: NDArray[np.float64], delay_s: float, ticks: int
 ) -> list[NDArray[np.float64]]:
-    """Poses of a run in which hearing's state is an earlier measurement."""
+    """Poses of a run in which hearing outputs its measurements ``delay_s`` late."""
     loop, tick_s = point.loop, point.loop.tick_s
     start = round(point.time_s / tick_s)
     late, part = divmod(delay_s, tick_s)
@@ -173,7 +185,8 @@ def _hearing_late(
     measured = deque([state[hearing]] * (int(late) + 2), maxlen=int(late) + 2)
     poses = []
     for k in range(start, start + ticks):
-        # Drake computes tick times as multiples too; a sum would miss the ticks.
+        # Drake's tick times are multiples of the period. Repeated additions would give
+        # slightly different times.
         then = (k + 1) * tick_s
         run.advance(then - part)
         # The tracker reads this measurement ``late`` ticks later than without delay.
@@ -190,9 +203,10 @@ def fitted_oscillation(
 ) -> tuple[float, float]:
     """Fits the growth rate, 1/s, and the frequency, rad/s, of an oscillation.
 
-    The peaks between the zeros give the envelope. The spacing of the peaks gives the
-    frequency, which is 0 if there are fewer than three peaks. The first fifth of the
-    evenly spaced times is left out, because faster modes die out there.
+    The peaks of |offset_m| give the envelope, and their spacing gives the frequency. If
+    there are fewer than three peaks, the frequency is 0, and the growth rate is that of
+    |offset_m|. ``time_s`` (n,) is evenly spaced, and ``offset_m`` is (n,). The first
+    fifth of the time is left out, because other modes decay there.
     """
     later = time_s >= time_s[0] + 0.2 * (time_s[-1] - time_s[0])
     t, x = time_s[later], offset_m[later]
@@ -201,7 +215,7 @@ def fitted_oscillation(
     if len(peaks) < 3:
         slope = np.polyfit(t, np.log(np.maximum(size, 1e-300)), 1)[0]
         return float(slope), 0.0
-    # Vertex of the parabola through a peak and its neighbors.
+    # Vertex of the parabola through each peak sample and its two neighbors.
     a, b, c = size[peaks - 1], size[peaks], size[peaks + 1]
     bend = np.maximum(2.0 * b - a - c, 1e-300)
     shift = 0.5 * (c - a) / bend

@@ -16,10 +16,11 @@ Port = tuple[str, str]
 class Runner:
     """Simulation whose state and cut inputs can be changed between steps.
 
-    The run uses the context of its simulator. Finish the run before you use the same
-    loop for anything else. It begins at ``state`` (n,), just before the control update
-    at ``time_s``, a multiple of ``tick_s``. ``fix(context, port, value)`` sets the
-    value of a cut input.
+    A cut input is an input port of a block that is disconnected from its source and has
+    a fixed value. ``fix(context, port, value)`` sets this value. The simulation begins
+    at ``state`` (n,), just before the control update at ``time_s``, which is a multiple
+    of ``tick_s``. The simulator may belong to an ``IdealLoop``. Finish the simulation
+    before you use this loop for anything else.
     """
 
     def __init__(
@@ -32,7 +33,8 @@ class Runner:
     ) -> None:
         self._simulator, self._fix = simulator, fix
         self._context = simulator.get_mutable_context()
-        # Python's views of the parts. Creating them each time costs a tenth of the run.
+        # References to the parts of the state. To create them in every step would take
+        # a tenth of the computing time.
         self._parts = [
             self._context.get_continuous_state_vector(),
             *map(
@@ -43,7 +45,7 @@ class Runner:
         begin(simulator, state, time_s, tick_s)
 
     def fix(self, port: Port, value: NDArray[np.float64]) -> None:
-        """Sets the value of a cut input from now on, in the unit of the port."""
+        """Sets the value of a cut input from now on, in the units of the port."""
         self._fix(self._context, port, value)
 
     def advance(self, time_s: float) -> None:
@@ -56,7 +58,7 @@ class Runner:
         return np.concatenate([part.CopyToVector() for part in self._parts])
 
     def set_state(self, indices: Sequence[int], values: NDArray[np.float64]) -> None:
-        """Replaces the elements of the state at some indices."""
+        """Replaces the elements of the state at ``indices`` by ``values``."""
         state = self.state()
         state[list(indices)] = values
         set_state(self._context, state)
@@ -65,14 +67,22 @@ class Runner:
 def run_periods(
     simulator: Any, state: Any, time_s: float, periods: int, tick_s: float
 ) -> None:
-    """Simulates periods from a state (n,) to just before the next control update."""
+    """Simulates some control periods from a state (n,).
+
+    Start and end are just before a control update. ``time_s`` is rounded to a multiple
+    of the control period ``tick_s``.
+    """
     begin(simulator, state, time_s, tick_s)
-    # Drake computes tick times as multiples; a sum of periods could miss the next tick.
+    # Drake's tick times are multiples of the period. A sum of periods would give a
+    # slightly different time.
     simulator.AdvanceTo((round(time_s / tick_s) + periods) * tick_s)
 
 
 def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
-    """Puts a simulator into a state (n,) just before the nearest control update."""
+    """Puts a simulator into a state (n,), just before a control update.
+
+    This is the control update nearest to ``time_s``.
+    """
     context = simulator.get_mutable_context()
     context.SetTime(round(time_s / tick_s) * tick_s)
     set_state(context, state)
@@ -82,14 +92,14 @@ def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
 
 
 def set_state(context: Any, state: Any) -> None:
-    """Sets the continuous states, then the discrete groups, from one vector."""
+    """Sets the whole state from one vector (n,): continuous states, discrete groups."""
     start = context.num_continuous_states()
     context.SetContinuousState(state[:start])
     set_discrete_state(context, state[start:])
 
 
 def set_discrete_state(context: Any, state: Any) -> None:
-    """Sets all discrete groups of a context from one vector."""
+    """Sets all discrete groups of a context, in their order, from one vector."""
     start = 0
     for group in range(context.num_discrete_state_groups()):
         size = context.get_discrete_state(group).size()

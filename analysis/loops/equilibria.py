@@ -1,4 +1,8 @@
-"""Search for all equilibria of the closed loop at rest in a workspace."""
+"""Search for all equilibria of the closed loop at rest in a workspace.
+
+``analysis.loops.equilibrium_search`` divides the workspace into cells, and excludes
+cells without a place of rest. This module finds the equilibria in the remaining cells.
+"""
 
 from __future__ import annotations
 
@@ -34,19 +38,22 @@ from systems.world.geometry import control_point, rectangle_corners
 
 #: Equilibria nearer to each other than this are the same, m.
 _SAME_M = 1e-6
-#: Starts of Newton's method in the weakest cells of a group.
+#: Number of cells of a group from which Newton's method starts: those with the weakest
+#: forces.
 _MOST_STARTS = 6
-#: First: approximate number of further starts in cells around which the force turns.
-#: Second: largest number of groups of cells after the first round.
+#: First: approximate number of other cells from which Newton's method starts: those
+#: around which the direction of the force makes full turns.
+#: Second: largest number of groups that are examined in each round after the first.
 _MOST_TURNED, _MOST_GROUPS = 12, 12
 #: Newton's method gives up at this distance from its start, m.
 _NEWTON_REACH_M = 0.5
-#: Edge of the smallest cells, m.
+#: Edge of the smallest cells of the first round, m.
 _SMALLEST_M = 0.002
-#: Remaining cells within this many smallest cells of a found equilibrium count as
-#: explained. Other remaining cells are divided further.
+#: Remaining cells within this distance of a found place of rest count as explained. The
+#: unit of the distance is the edge of the smallest cells of the first round. Other
+#: remaining cells are divided in further rounds.
 _KNOWN_CELLS = 3
-#: First: largest number of rounds of this division.
+#: First: largest number of rounds, including the first.
 #: Second: number of cells above which the division stops.
 _ROUNDS, _MOST_CELLS = 10, 60_000
 #: Half width of the path in the test for a free line of sight, m.
@@ -57,40 +64,47 @@ _SAME_OFFSET_M = 1e-6
 
 @dataclass(frozen=True)
 class EquilibriumSearch:
-    """All equilibria found in a workspace, and how complete the search was."""
+    """All equilibria found in a workspace, and how complete the search was.
+
+    A place of rest is a position of P at which the robot can rest: an equilibrium or a
+    switching point.
+    """
 
     scenario: Scenario = field(repr=False)
     """Scenario with exact sensors and bodies at rest."""
     points: tuple[OperatingPoint, ...]
     """Equilibria, the nearest to the source first."""
     switching: tuple[SwitchingPoint, ...]
-    """Places of rest where several bodies are equally near, see ``SwitchingPoint``."""
+    """Switching points: places of rest where several bodies are equally near."""
     area_m: SearchArea
     """Searched area of P in W: smallest x, largest x, smallest y, largest y."""
     cell_m: float
-    """Edge of the smallest cells of the first round, m."""
+    """Edge of the smallest cells, m, before cells without a found place of rest were
+    divided further."""
     cells: int
-    """Number of cells of all sizes."""
+    """Number of cells of all sizes that were examined."""
     unresolved: tuple[tuple[float, float], ...]
-    """One point, m, of each group of cells that the search could neither exclude nor
-    explain by a listed place of rest."""
+    """One point in W, m, of each group of cells that the search could neither exclude
+    nor explain by a listed place of rest."""
     empty_outside: bool
-    """Whether the attraction exceeds every repulsion outside the area."""
+    """Whether the attraction exceeds every push outside the area, so that P cannot rest
+    there."""
 
     moving: tuple[str, ...]
     """Names of the bodies that move in the given scenario."""
 
     @property
     def complete(self) -> bool:
-        """Whether all places of rest lie within three cells of a listed place."""
+        """Whether all places of rest lie within ``3 * cell_m`` of a listed one."""
         return not self.unresolved and self.empty_outside
 
     def way_m(self, point: OperatingPoint) -> float:
         """Returns the length of the shortest free path from the start to a point, m.
 
-        The path is that of the control point P. The path keeps a distance of half the
-        robot's width from every body. If the start or the point itself is nearer to a
-        body, the path may come as near as this. Without a path, the length is infinite.
+        The path is that of the control point P. It keeps a distance of half the robot's
+        width from every body, or the clearance of the point if this is smaller. If the
+        start is even nearer to a body, the path keeps only the start's distance from
+        this body. Without a path, the length is infinite.
         """
         return self._way(point, self.scenario.only.robot.width_m / 2.0)
 
@@ -108,15 +122,11 @@ class EquilibriumSearch:
     def follow_point(self) -> OperatingPoint:
         """Returns the stable equilibrium at which the robot should follow the source.
 
-        The choice has these rules:
-
-        - Equilibria with a free path from the start come first. If no equilibrium has a
-          free path, all stable equilibria are candidates.
-        - The method returns the candidate whose distance from the source is nearest to
-          the follow distance.
-        - If several candidates are equally near, the method returns the one nearest to
-          the start.
-        - If there is no stable equilibrium, the method raises InputError.
+        The candidates are the stable equilibria with a free path from the start. If
+        none has a free path, all stable equilibria are candidates. The method returns
+        the candidate whose distance from the source is nearest to the follow distance.
+        If several candidates are equal in this respect, it returns the one nearest to
+        the start. Raises InputError if there is no stable equilibrium.
         """
         sinks = [point for point in self.points if point.stable]
         if not sinks:
@@ -138,7 +148,7 @@ class EquilibriumSearch:
 
     @property
     def statement(self) -> str:
-        """What was searched, and how completely, in one or two sentences."""
+        """Sentences for people: what was searched, and how completely."""
         x0, x1, y0, y1 = self.area_m
         where = f"[{x0:g}, {x1:g}] m x [{y0:g}, {y1:g}] m"
         text = (
@@ -154,7 +164,10 @@ class EquilibriumSearch:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Warnings that a reader needs before the numbers about ``follow_point``."""
+        """Warnings about the search and about the equilibrium ``follow_point()``.
+
+        Raises InputError if there is no stable equilibrium.
+        """
         found = []
         at = self.follow_point()
         x, y = at.p_WP
@@ -208,12 +221,12 @@ def find_equilibria(
 ) -> EquilibriumSearch:
     """Searches a workspace for all equilibria of the closed loop at rest.
 
-    The sensors are taken as exact, and the bodies as at rest where they are at 0 s. Use
+    The search assumes exact sensors, and bodies that rest where they are at 0 s. Use
     ``frozen_scenario`` for another time. ``area_m`` bounds the positions of the control
-    point P. By default, it contains all bodies and the start, with a margin of the
-    follow distance plus 1 m. Cells whose edge is not longer than ``smallest_m`` are not
-    divided any more. Raises InputError if the area is empty or the law has no
-    derivative.
+    point P in W. By default, it contains all bodies and the start, with a margin of the
+    follow distance plus 1 m. Cells are divided until their edge is at most
+    ``smallest_m``, and further if they may contain a place of rest but none is found.
+    Raises InputError if the area is empty or the law has no derivative.
     """
     if not smallest_m > 0.0:
         raise InputError("smallest_m", f"is {smallest_m}; give a positive length in m")
@@ -235,8 +248,9 @@ def find_equilibria(
     for round_ in range(_ROUNDS):
         groups = search.groups(left, finest)
         if round_:
-            # Many groups remain along a circle that is nearly a continuum of
-            # equilibria. Skipped groups are examined again after their division.
+            # Many groups may remain along a circle around the source on which the force
+            # is nearly zero. Only the groups with the weakest forces are examined now.
+            # The next round divides the others and examines them again.
             groups = sorted(groups, key=lambda group: group.strengths.min())
             groups = groups[:_MOST_GROUPS]
         for group in groups:
@@ -288,7 +302,8 @@ class _Found:
     ) -> None:
         """Searches for places of rest in and near a group of cells.
 
-        The equilibrium nearest to the robot's start represents a continuum.
+        ``edge`` is the edge of the cells, m. If the equilibria form a continuum, only
+        the one nearest to the robot's start is added.
         """
         near = np.linalg.norm(group.centers - self.start, axis=1).argmin()
         turned = np.flatnonzero(group.winding)
@@ -318,7 +333,10 @@ class _Found:
                 self.switching.append(point)
 
     def _add_flat(self, search: CellSearch, root: NDArray[np.float64]) -> None:
-        """Keeps the point nearest to the start of each circle around the source."""
+        """Adds an equilibrium ``root`` of a continuum, a circle around the source.
+
+        Of each circle, only the point nearest to the start is kept.
+        """
 
         def radius(p: NDArray[np.float64]) -> float:
             return float(np.linalg.norm(p - search.p_WS))
@@ -335,13 +353,13 @@ class _Found:
     def explain(
         self, search: CellSearch, cells: NDArray[np.float64], known_m: float
     ) -> NDArray[np.bool_]:
-        """(n,) whether each cell lies near a known place of rest."""
+        """(n,) whether each cell lies within ``known_m`` of a found place of rest."""
         near = np.zeros(len(cells), dtype=bool)
         for place in (*self.roots, *(point.p_WP for point in self.switching)):
             near |= np.linalg.norm(cells - place, axis=1) <= known_m
         for place in self.flat:
             near |= np.linalg.norm(cells - place, axis=1) <= known_m
-            # Without a push, P is free to move around the source.
+            # Where no body pushes, P can rest anywhere on a circle around the source.
             to = cells - search.p_WS
             radius = float(np.linalg.norm(place - search.p_WS))
             close = np.abs(np.linalg.norm(to, axis=1) - radius) <= 0.5 * known_m
@@ -374,7 +392,7 @@ def _near(root: NDArray[np.float64], roots: list[NDArray[np.float64]]) -> bool:
 def nearest_equilibrium(
     field_: ForceField, begin: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Finds a point without force on the robot by Newton's method.
+    """Finds a point near ``begin`` at which no force acts on P, by Newton's method.
 
     ``begin`` and the result are (2,) positions of P in the world frame W, m. The result
     is None if the method does not converge.
@@ -393,5 +411,9 @@ def nearest_equilibrium(
 
 
 def follow_equilibrium(scenario: Scenario) -> OperatingPoint:
-    """Returns the equilibrium of ``EquilibriumSearch.follow_point``."""
+    """Returns the stable equilibrium at which the robot should follow the source.
+
+    ``EquilibriumSearch.follow_point`` has the rules. Raises InputError if there is no
+    stable equilibrium.
+    """
     return find_equilibria(scenario).follow_point()

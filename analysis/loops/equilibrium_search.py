@@ -1,39 +1,44 @@
 """Exhaustive search for the places in a workspace where the control point P can rest.
 
-P lies ahead of the wheel axle. The source pulls P, and body k pushes P, so that the
-nearest body k gives the force F_k(p) = pull(p) + push_k(p) at a point p. P can rest in
-two cases (Filippov's convex definition):
+P lies ahead of the wheel axle. The source pulls P, and only the nearest body pushes P.
+If body k is the nearest, the force on P at a point p is F_k(p) = pull(p) + push_k(p).
+The force jumps where the nearest body changes. According to Filippov's convex
+definition of such motions, P can rest at p in two cases:
 
 - Only body k is nearest at p, and F_k(p) = 0.
-- Several bodies are equally near, and the convex hull of their F_k(p) contains the
-  origin.
+- Several bodies are equally near to p, and the convex hull of their forces F_k(p)
+  contains the origin.
 
-The search divides the workspace into square cells. It excludes a cell if the cell
-contains no place of rest. It divides every other cell into quarters.
+The search divides the workspace into square cells. It excludes a cell if it can prove
+that the cell contains no place of rest. It divides every other cell into quarters.
 
-Why the search loses no place of rest: let c be the center of a cell, r half of its
-diagonal, and d_k the distances from the bodies.
+The proof for one cell uses the center c of the cell, half the diagonal r of the cell,
+and the distances d_k(p) of a point p from the bodies:
 
-- Distances change by at most r within the cell. The nearest body of any point of the
-  cell therefore satisfies d_k(c) <= min d(c) + 2 r. These bodies *count*.
-- Within the cell, F_k changes by at most ``change``. This bound is r times the
-  Lipschitz bound of pull and push, plus the error of the law's table.
+- Distances change by at most r between c and any other point of the cell. If body k is
+  the nearest body of some point of the cell, then d_k(c) <= min d(c) + 2 r. Every body
+  that satisfies this condition *counts*.
+- F_k changes by at most ``change`` between c and any other point of the cell. This
+  bound is r times a Lipschitz constant of pull and push, plus the error of the samples
+  of the law.
 - Suppose that a unit vector u satisfies F_k(c) . u > change for every body that counts.
-  Then F_k(p) . u > 0 for all of them at every p of the cell. Hence no convex hull
-  contains the origin, and the cell is excluded.
-- If only one body counts, F_k = 0 also requires |pull| = |push_k|. The cell is excluded
-  if these magnitudes differ by more than they can change within the cell. If several
-  bodies count, this test does not apply, because two pushes can cancel each other (in
-  the middle of a corridor).
-- With ``aggregation: sum``, the same holds for the sums of the pushes of the nearest
-  three bodies.
+  Then F_k(p) . u > 0 for all these bodies at every point p of the cell. Hence no convex
+  hull of these forces contains the origin, and the cell is excluded.
+- If only one body k counts, F_k(p) = 0 also requires |pull(p)| = |push_k(p)|. The cell
+  is excluded if these magnitudes differ at c by more than they can change within the
+  cell. If several bodies count, this test does not apply, because two pushes can cancel
+  each other, for example in the middle of a corridor.
+
+With ``aggregation: sum``, the nearest three bodies push. The same proof then applies to
+the sums of their pushes.
 
 Only whole cells are excluded, and the quarters of a cell cover the cell. By induction,
 every place of rest lies in one of the remaining cells.
 
-The bound assumes that the law is convex or concave between two samples, 1 mm apart. The
-deviation of the law from the chord between two samples is then at most twice the
-deviation at the middle. The bound is the slope of the chords plus this deviation.
+The law is sampled every 1 mm. The proof assumes that the law is convex or concave
+between two samples. Its deviation from the chord between these samples is then at most
+twice its deviation at the middle. ``change`` contains the slope of the chord and this
+deviation.
 """
 
 from __future__ import annotations
@@ -58,12 +63,12 @@ _SAMPLE_M = 1e-3
 #: Edge of the first cells, m.
 _FIRST_CELL_M = 0.25
 
-#: Points nearer to a body than this count as contact and are not searched, m. There
-#: the direction to the nearest point turns too much within a cell.
+#: Points nearer to a body than this count as contact and are not searched, m. So near
+#: to a body, the direction to its nearest point turns too much within a cell.
 CONTACT_M = 4e-3
-#: Number of bodies whose pushes are added with ``aggregation: sum``.
+#: Largest number of bodies whose pushes are added with ``aggregation: sum``.
 _SLOTS = 3
-#: Number of steps towards the point of the hull that is nearest to the origin.
+#: Number of steps towards the point of a convex hull that is nearest to the origin.
 _HULL_STEPS = 6
 #: Number of steps of Newton's method to a switching point.
 _NEWTON_STEPS = 25
@@ -82,10 +87,11 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def _sampled(field: ForceField, farthest: float) -> tuple[Floats, ...]:
-    """Distances, m, law, N, and deviation of the law from its chord, N.
+    """Samples of the law: (n,) distances, m, forces, N, and deviations, N.
 
-    The deviation belongs to the interval after each distance. If the law has a corner
-    inside an interval, one end of the interval is moved to the corner.
+    Each deviation is a bound on the difference between the law and its chord in the
+    interval after the distance. If the law has a corner inside an interval, one end of
+    the interval is moved to the corner.
     """
 
     def law(c: Floats) -> Floats:
@@ -119,33 +125,39 @@ def _sampled(field: ForceField, farthest: float) -> tuple[Floats, ...]:
 class SwitchingPoint:
     """Place of rest where several bodies are equally near.
 
-    Each body would give another force if it alone were the nearest. A weighted mean of
-    these forces is zero.
+    Each of these bodies, if it alone were the nearest, would cause a different force on
+    P. A weighted mean of these forces is zero.
     """
 
     p_WP: Floats
     """(2,) position of P in W, m."""
     attractive: bool
-    """Whether all forces drive P to this point, so that P chatters near the point."""
+    """Whether the forces drive P back to this point, so that P chatters near it."""
 
 
 @dataclass(frozen=True)
 class Leftover:
-    """Group of neighboring smallest cells that may contain an equilibrium."""
+    """Group of neighboring cells that may contain an equilibrium.
+
+    The search has divided these cells as far as it divides any cell.
+    """
 
     centers: Floats
     """(n, 2) centers of the cells in W, m."""
     strengths: Floats
     """(n,) magnitude of the force at each center, N."""
     winding: NDArray[np.int64]
-    """(n,) number of turns of the force direction along the edge of each cell. It is
-    nonzero around an isolated equilibrium."""
+    """(n,) number of full turns of the force on the way around each cell. Around an
+    isolated equilibrium, this number is not zero."""
     switches: Flags
     """(n,) whether the nearest body changes within the cell."""
 
 
 class CellSearch:
-    """Bounds the force in each cell and excludes cells without equilibria."""
+    """Excludes cells that provably contain no place of rest.
+
+    The module docstring has the proof.
+    """
 
     def __init__(self, field: ForceField) -> None:
         scenario = field.loop.scenario
@@ -163,11 +175,14 @@ class CellSearch:
     def left_over(
         self, area: SearchArea, smallest_m: float
     ) -> tuple[Floats, int, float]:
-        """Returns the cells of an area that may contain an equilibrium.
+        """Returns the smallest cells of an area that may contain an equilibrium.
 
-        Cells whose edge is not longer than ``smallest_m`` are not divided any more. The
-        three values are the (n, 2) centers of these cells, m, the number of cells of
-        all sizes that were examined, and the edge of these cells, m.
+        Cells with an edge of at most ``smallest_m`` are not divided any more. Three
+        values are returned:
+
+        - (n, 2) centers of the cells that were not excluded, m
+        - number of cells of all sizes that were examined
+        - edge of the cells that were not excluded, m
         """
         edge = _FIRST_CELL_M
         x = np.arange(area[0] + edge / 2, area[1] + edge / 2, edge)
@@ -181,10 +196,10 @@ class CellSearch:
         return cells, looked_at, edge
 
     def quartered(self, cells: Floats, edge: float) -> tuple[Floats, float]:
-        """Divides cells into quarters, and returns those with a possible equilibrium.
+        """Divides cells into quarters, and returns those that are not excluded.
 
-        ``cells`` are (n, 2) centers, m. The result has the (k, 2) centers and the edge
-        of these quarters, m.
+        ``cells`` are (n, 2) centers, m, and ``edge`` is the edge of the cells, m. The
+        result has the (k, 2) centers of the remaining quarters, m, and their edge, m.
         """
         edge /= 2.0
         corners = edge / 2.0 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
@@ -192,7 +207,10 @@ class CellSearch:
         return cells[~self._excluded(cells, edge)], edge
 
     def outside_is_empty(self, area: SearchArea) -> bool:
-        """Whether the attraction exceeds every repulsion outside the area."""
+        """Returns whether the attraction exceeds every push outside the area.
+
+        If it does, P cannot rest outside the area.
+        """
         x, y = self.p_WS
         gap = min(x - area[0], area[1] - x, y - area[2], area[3] - y)
         d_f = self._attraction.follow_distance_m
@@ -206,7 +224,10 @@ class CellSearch:
         return pull > push * self._slots
 
     def forces(self, points: Floats) -> Floats:
-        """(n, 2) forces in W at points (n, 2), from the samples of the law, N."""
+        """Returns the (n, 2) forces on P in W at points (n, 2), m, in N.
+
+        The pushes are interpolated between the samples of the law.
+        """
         vectors, distances = self._vectors(points)
         pushes = self._pushes(vectors, distances)
         rank = distances.argsort(axis=0).argsort(axis=0)
@@ -220,7 +241,7 @@ class CellSearch:
         return self._attraction.stiffness_n_m * share * to_source
 
     def _vectors(self, points: Floats) -> tuple[Floats, Floats]:
-        """Vectors to the nearest points of bodies (k, n, 2), and lengths (k, n), m."""
+        """Vectors (k, n, 2) from n points to k bodies, and their lengths (k, n), m."""
         vectors = (nearest_point_on_rectangle(points.T, body) for body in self._bodies)
         stacked = np.array([np.stack(vector, axis=-1) for vector in vectors])
         return stacked, np.linalg.norm(stacked, axis=-1)
@@ -230,7 +251,7 @@ class CellSearch:
         return -vectors * (force / np.maximum(distances, 1e-12))[..., None]
 
     def _excluded(self, cells: Floats, edge: float) -> Flags:
-        """(n,) whether the proof above rules out an equilibrium in each cell."""
+        """(n,) whether the proof in the module docstring excludes each cell."""
         radius = edge * np.sqrt(0.5)
         vectors, distances = self._vectors(cells)
         pull, pushes = self._pull(cells), self._pushes(vectors, distances)
@@ -238,8 +259,9 @@ class CellSearch:
         bent = np.maximum(steep, self._in_cell(self._bend, distances, radius))
         error = self._in_cell(self._error, distances, radius)
         own = self._pull_slope(cells, radius)
-        # counts: bodies that are among the nearest somewhere in the cell.
-        # surely: bodies that are among the nearest everywhere in the cell.
+        # The pushing bodies are the ``_slots`` nearest ones.
+        # counts: bodies that may push somewhere in the cell.
+        # surely: bodies that push everywhere in the cell.
         ordered = np.sort(distances, axis=0)
         counts = distances <= ordered[self._slots - 1] + 2.0 * radius
         if self._slots < len(ordered):
@@ -268,11 +290,13 @@ class CellSearch:
         surely: Flags,
         change: Floats,
     ) -> Flags:
-        """(n,) whether all forces of a cell exceed their change along some direction.
+        """(n,) whether all possible forces of each cell point to one side.
 
-        The change is the largest that is possible within a cell. Gilbert's method tries
-        several directions. Each is the direction of a point in the convex hull of the
-        forces. The point moves nearer to the origin at each step.
+        This is the case if the component of every possible force along one direction is
+        larger than ``change`` (n,), N. The bodies ``surely`` (k, n) push, and the
+        bodies ``maybe`` (k, n) may push. Gilbert's method finds directions to try: a
+        point in the convex hull of the possible forces moves nearer to the origin at
+        each step, and its direction from the origin is tried.
         """
         fixed = pull + np.where(surely[..., None], pushes, 0.0).sum(axis=0)
         missing = self._slots - surely.sum(axis=0)
@@ -280,7 +304,7 @@ class CellSearch:
             return np.asarray(np.linalg.norm(fixed, axis=1) > change)
 
         def least(direction: Floats) -> Floats:
-            """(n, 2) force with the smallest component along a direction (n, 2)."""
+            """(n, 2) possible forces with the smallest components along directions."""
             along = np.einsum("knj,nj->kn", pushes, direction)
             rank = np.where(maybe, along, np.inf).argsort(axis=0).argsort(axis=0)
             chosen = maybe & (rank < missing)
@@ -303,7 +327,7 @@ class CellSearch:
         return clear
 
     def _depth(self, points: Floats) -> Floats:
-        """(n,) depth of points inside a body, m; negative outside all bodies."""
+        """(n,) distances of points inside a body from its outline, m; outside: < 0."""
         depth = np.full(len(points), -np.inf)
         for x, y, theta, length, width in self._bodies:
             u, v = rotate(-theta, points[:, 0] - x, points[:, 1] - y)
@@ -321,8 +345,12 @@ class CellSearch:
 
     @staticmethod
     def _in_cell(samples: Floats, distances: Floats, radius: float) -> Floats:
-        """(k, n) largest value of a function of distance within each cell."""
-        # Samples may be moved by half their spacing.
+        """(k, n) largest of the samples that lie within a cell.
+
+        ``samples`` are values at the distances of the samples of the law. ``distances``
+        (k, n) are those from the cell centers to the bodies, m.
+        """
+        # ``_sampled`` may have moved samples by up to half their spacing.
         window = 2 * int(np.ceil(radius / _SAMPLE_M)) + 5
         largest = maximum_filter1d(samples, window)
         index = np.clip((distances / _SAMPLE_M).astype(int), 0, len(largest) - 1)
@@ -333,7 +361,7 @@ class CellSearch:
         if not len(cells):
             return []
         index = np.rint((cells - cells.min(axis=0)) / edge).astype(int)
-        # The cells are few and far apart: a tree finds neighbors faster than a grid.
+        # The cells are few and scattered: a tree finds neighbors faster than a grid.
         tree = cKDTree(index)
         pairs = tree.query_pairs(1.5, p=np.inf, output_type="ndarray")
         joined = coo_array(
@@ -366,8 +394,8 @@ class CellSearch:
     def switching_points(self, group: Leftover, edge: float) -> list[SwitchingPoint]:
         """Finds places of rest near a group where two or three bodies are equally near.
 
-        With ``aggregation: sum`` the list is empty, because the force then switches
-        between sums.
+        With ``aggregation: sum``, the list is empty, because the force then jumps
+        between sums of pushes. ``edge`` is the edge of the cells, m.
         """
         starts = group.centers[group.switches]
         if not len(starts) or self._slots > 1:
@@ -385,14 +413,21 @@ class CellSearch:
         return found
 
     def _each(self, points: Floats, bodies: NDArray[np.int64]) -> tuple[Floats, Floats]:
-        """Distances (size, n) of bodies (size, n), m, and forces (size, n, 2), N."""
+        """Distances (size, n), m, and forces F_k (size, n, 2), N, of some bodies.
+
+        ``bodies`` (size, n) are the indices of the bodies for each of n points.
+        """
         vectors, distances = self._vectors(points)
         row = np.arange(points.shape[0])
         forces = self._pull(points) + self._pushes(vectors, distances)
         return distances[bodies, row], forces[bodies, row]
 
     def _newton(self, starts: Floats, bodies: NDArray[np.int64]) -> Floats:
-        """(n, 2) points where bodies are equally near, m, and two forces parallel."""
+        """(n, 2) points in W to which Newton's method leads from the starts, m.
+
+        At a solution, two or three bodies are equally near. If there are two bodies,
+        their forces F_k are also parallel.
+        """
 
         def residual(points: Floats) -> Floats:
             distances, forces = self._each(points, bodies)
@@ -419,7 +454,11 @@ class CellSearch:
         return p
 
     def _cancels(self, p: Floats, bodies: NDArray[np.int64]) -> bool:
-        """Whether the bodies are the nearest at p and the hull contains the origin."""
+        """Whether P can rest at p between the bodies.
+
+        The bodies must be the nearest ones of p and equally near, and the convex hull
+        of their forces F_k must contain the origin.
+        """
         distances, forces = self._each(p[None], bodies[:, None])
         least = self._vectors(p[None])[1].min()
         if np.ptp(distances) > _SAME_M or abs(distances[0, 0] - least) > _SAME_M:
@@ -437,12 +476,12 @@ class CellSearch:
     def _attracts(self, p: Floats, bodies: NDArray[np.int64]) -> bool:
         """Whether the forces drive the control point P to a switching point.
 
-        The nearest body alone pushes P. The force is then that of a potential: the
-        potential of the pull plus Phi(smallest distance). If the bodies push, the
-        directional derivative of the potential at p along u is the largest -F_k . u.
-        This derivative is not negative, because the hull contains the origin. The
-        derivative can be zero only along the line on which two bodies stay equally
-        near. Along this line the force must lead back to p.
+        The force has a potential: that of the pull plus that of the push, which is a
+        function of the smallest distance from a body. If the bodies push and do not
+        pull, the slope of the potential at p in the direction u is the largest of the
+        values -F_k . u. No such slope is negative, because the convex hull of the
+        forces contains the origin. The slope can be zero only along the line on which
+        two bodies stay equally near. Along this line, the force must lead back to p.
         """
         distances, _ = self._each(p[None], bodies[:, None])
         if np.interp(distances[0, 0], self._c, self._f, right=0.0) <= 0.0:
@@ -459,7 +498,10 @@ class CellSearch:
         return bool(ahead - behind < 1e-9)
 
     def _sliding(self, p: Floats, bodies: NDArray[np.int64]) -> Floats:
-        """(2,) mean of two forces that keeps P equally near to their bodies, N."""
+        """(2,) weighted mean of the forces of two bodies, N.
+
+        It keeps P equally near to both bodies.
+        """
         vectors, distances = (x[bodies, 0] for x in self._vectors(p[None]))
         away = -vectors / distances[:, None]
         normal = away[0] - away[1]

@@ -1,7 +1,7 @@
 """Force on the control point of a robot at rest, as a function of position.
 
-The controller and the exact obstacle sensor of the simulation compute the force. P is
-the control point ahead of the wheel axle.
+The force is the output of the simulation's own controller, with exact sensors as its
+input. P is the control point ahead of the wheel axle.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ class ForceField:
     """Force on the control point P of a robot at rest, as a function of position.
 
     With exact sensors, the force does not depend on the robot's heading, with one
-    exception: a source straight behind the robot pulls slightly sideways. This class
-    therefore turns the robot so that the source is ahead. The controller takes the
-    speed of every obstacle as zero, as in the control period in which it first sees the
-    obstacle. Moving bodies are frozen at ``time_s``. Without this time, they raise
-    InputError.
+    exception: a source straight behind the robot pulls slightly sideways. The heading
+    is therefore 0 or pi, so that the source is never straight behind. The controller
+    takes the speed of every obstacle as zero, as in the first control period in which
+    an obstacle is visible. Moving bodies are frozen at ``time_s``. Raises InputError if
+    a body moves and ``time_s`` is None.
     """
 
     def __init__(self, loop: IdealLoop, time_s: float | None = None) -> None:
@@ -64,7 +64,10 @@ class ForceField:
         return value_and_gradient(forces[:2] + forces[2:], 2)
 
     def damping(self, p_WP: ArrayLike) -> float:
-        """Damping along x at ``p_WP``: -dF_x/dv_x of the virtual mass, N s/m."""
+        """Damping -dF_x/dv_x at ``p_WP`` for P at rest, N s/m.
+
+        F_x is the force on P along x in W, and v_x the velocity of P along x.
+        """
         self._forces(np.asarray(p_WP, dtype=float), twin=True)
         block, context = self._controller(twin=True)
         port = block.GetInputPort("v_WP")
@@ -80,7 +83,10 @@ class ForceField:
         return self.loop.scenario.follower.ultrasonic.maximum_range_m
 
     def law(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) repulsion by one body at rest, N, at distances (n,), m."""
+        """Returns the (n,) push of one body at rest, N, at (n,) distances, m.
+
+        The push is positive away from the body. It is 0 beyond ``reach_m``.
+        """
         block, context = self._controller(twin=False)
         self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
         port = block.GetInputPort("collision_vectors_B")
@@ -122,7 +128,7 @@ class ForceField:
         block.GetInputPort("features").FixValue(context, np.asarray(features))
 
     def _forces(self, p_WP: Any, *, twin: bool) -> Any:
-        # The robot faces the source: a source straight behind would pull sideways.
+        # A source straight behind the robot would pull sideways.
         theta = 0.0 if float_of(p_WP[0]) <= self.p_WS[0] else math.pi
         offset = self.loop.scenario.only.robot.control_point_m
         x, y = p_WP[0] - offset * math.cos(theta), p_WP[1] - offset * math.sin(theta)

@@ -2,17 +2,18 @@
 
 A frequency grid alone misses what happens between two of its points. For example, the
 peak of a mode with a damping ratio of 1e-3 is only a thousandth of its frequency wide.
-Here every level is a real quadratic form of the response G,
+In this module, the response G reaches a level at the frequencies that satisfy
 
-    a |G|^2 + 2 Re(b G) + c = 0,
+    a |G|^2 + 2 Re(b G) + c = 0
 
-on the border of stability (s = j omega, or z = exp(j omega T)). The left side equals a
-rational function of s or z. The zeros of this function are the eigenvalues of a matrix
-pencil of twice the order of G. In continuous time this is the Hamiltonian pencil of
-Boyd, Balakrishnan and Kabamba (1989), in sampled time the symplectic pencil. The zeros
-on the border are the wanted frequencies. Because of rounding errors, the eigenvalues
-only show *where to look*. The callers evaluate G at and between these frequencies, and
-refine the result.
+on the border of stability (s = j omega, or z = exp(j omega T)), with real a and c. The
+left side equals a rational function of s or z. The zeros of this function are the
+eigenvalues of a matrix pencil with twice the order of G. In continuous time, this is
+the Hamiltonian pencil of Boyd, Balakrishnan and Kabamba (1989). In sampled time, it is
+the symplectic pencil. The zeros on the border of stability give the wanted frequencies.
+
+The eigenvalues have rounding errors and only show *where to look*. Callers therefore
+evaluate G at these frequencies and between them, and refine the result.
 
 Sources: Boyd, Balakrishnan and Kabamba, "A bisection method for computing the
 H-infinity norm", Math. Control Signals Systems 2 (1989); Bruinsma and Steinbuch, "A
@@ -31,23 +32,26 @@ from scipy.optimize import brentq, minimize_scalar
 
 from analysis.loops.linear_models import LinearModel, s_plane
 
-#: First: points of a grid for figures. Second: points of the first grid of a search.
+#: Number of points of a frequency grid. First: for figures. Second: for the first grid
+#: of a search.
 GRID_POINTS, SEARCH_POINTS = 1500, 100
-#: Additional points near the Nyquist frequency of a sampled response, as a share.
+#: Number of additional points near the Nyquist frequency of a sampled response, as a
+#: share of the number of points of the grid.
 _CLOSE = 0.2
 #: The grid reaches at least from the first to the second frequency, rad/s. In sampled
-#: time the grid ends at the Nyquist frequency.
+#: time, the grid ends at the Nyquist frequency.
 _LOWEST, _HIGHEST = 1e-3, 1e3
 #: Offsets of grid points from the frequency of a mode, in units of its decay rate.
 _ABOUT = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])
 #: Poles below this share of the fastest one count as integrators in the grid.
 _INTEGRATOR = 1e-7
-#: Smallest ratio of two neighboring shifts of the pencil.
+#: Smallest ratio of two neighboring shifts. A shift is a frequency near which the
+#: eigenvalues of the pencil are computed accurately.
 _SHIFT_RATIO = 30.0
 #: Relative accuracy of a peak.
 _PEAK = 1e-9
-#: Largest number of rounds for a peak. Two or three usually suffice. More would be due
-#: to rounding errors.
+#: Largest number of rounds in the search for a peak. Two or three usually suffice. Only
+#: rounding errors could require more.
 _ROUNDS = 20
 
 
@@ -60,9 +64,10 @@ def frequency_grid(
 ) -> NDArray[np.float64]:
     """Returns (k,) ascending frequencies that resolve every mode, rad/s.
 
-    The grid begins at ``lowest`` or below the slowest mode. It ends at the Nyquist
-    frequency, or beyond the fastest mode in continuous time, where ``period_s`` is
-    None. It has ``points`` on a logarithmic scale, besides those near the modes.
+    ``poles`` are in the z plane. In continuous time, ``period_s`` is None, and they are
+    in the s plane. The grid begins at ``lowest``, rad/s, or below the slowest mode. It
+    ends at the Nyquist frequency, or in continuous time beyond the fastest mode. It has
+    ``points`` on a logarithmic scale, and additional points near the modes.
     """
     s = s_plane(poles, period_s)
     size = np.abs(s)
@@ -89,11 +94,11 @@ def level_frequencies(
 ) -> NDArray[np.float64]:
     """Returns frequencies at which a |G|^2 + 2 Re(b G) + c may be zero.
 
-    G is a model with one input and one output, and without poles on the border of
-    stability. With b = 1, the sum has the real part of G, and with b = -1j the
-    imaginary part. The (k,) ascending frequencies, rad/s, are between 0 and the Nyquist
-    frequency. All zeros are among them, up to rounding errors. Not every frequency is a
-    zero.
+    G is the response of ``model``, which has one input, one output, and no poles on the
+    border of stability. With b = 1, the second term is twice the real part of G. With
+    b = -1j, it is twice the imaginary part. The (k,) ascending frequencies, rad/s, are
+    above 0 and below the Nyquist frequency. They contain all zeros of the expression,
+    up to rounding errors, and also frequencies that are not zeros.
     """
     n, T = len(model.A), model.period_s
     if n == 0:
@@ -121,7 +126,7 @@ def level_frequencies(
         try:
             inverse = np.linalg.solve(M - at * N, N)
         except np.linalg.LinAlgError:
-            continue  # the form is zero at the shift, or everywhere
+            continue  # the expression is zero at the shift, or everywhere
         mu = np.linalg.eigvals(inverse)
         points = at + 1.0 / mu[np.abs(mu) > 1e-300]
         found.append(np.abs(np.angle(points) / T if T else points.imag))
@@ -141,7 +146,7 @@ def _balanced(model: LinearModel) -> tuple[NDArray[np.float64], ...]:
 
 
 def _shifts(model: LinearModel) -> list[float]:
-    """Frequencies of some modes; a shift gives accurate eigenvalues near itself."""
+    """Frequencies of some modes, rad/s, near which to compute accurate eigenvalues."""
     top = math.pi / model.period_s if model.period_s else math.inf
     size = np.sort(np.abs(model.s_poles))
     chosen: list[float] = []
@@ -152,7 +157,7 @@ def _shifts(model: LinearModel) -> list[float]:
 
 
 def with_middles(omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Adds the geometric mean between each two neighbors, and sorts the frequencies."""
+    """Returns the frequencies and the geometric means of neighbors, sorted."""
     omega = np.unique(omega)
     return np.sort(np.concatenate((omega, np.sqrt(omega[:-1] * omega[1:]))))
 
@@ -161,10 +166,11 @@ def crossings(
     omega: NDArray[np.float64],
     function: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> list[float]:
-    """Returns the ascending frequencies at which a function changes its sign.
+    """Returns the ascending frequencies at which a function of frequency is zero.
 
-    At least one of the ascending frequencies ``omega`` must lie between any two zeros.
-    ``with_middles`` of ``level_frequencies`` satisfies this condition.
+    ``omega`` (n,) are ascending frequencies, rad/s. At least one of them must lie
+    between any two zeros of the function. The result of ``with_middles``, applied to
+    that of ``level_frequencies``, satisfies this condition.
     """
     values = np.sign(function(omega))
     exact = [float(w) for w in omega[values == 0.0]]
@@ -187,11 +193,11 @@ def crossings(
 def peak(model: LinearModel, offset: float = 0.0) -> tuple[float, float]:
     """Returns the largest |G - offset| over all frequencies, and its frequency, rad/s.
 
-    This is the H-infinity norm of a stable model with one input and one output. The
-    method is that of Bruinsma and Steinbuch. The largest value so far is a level. The
-    method then looks for larger values at the frequencies where the response crosses
-    this level, and half way between them. Frequencies reach to the Nyquist frequency,
-    or to infinity in continuous time.
+    ``model`` is stable and has one input and one output. Its response is G. The first
+    value is the H-infinity norm of G - offset. The method is that of Bruinsma and
+    Steinbuch: the largest value so far is a level, and larger values are sought at the
+    frequencies where |G - offset| crosses this level, and between them. The frequencies
+    reach up to the Nyquist frequency, or to infinity in continuous time.
     """
 
     def size(omega: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -229,7 +235,7 @@ def _refined(
     best: float,
     where: float,
 ) -> tuple[float, float]:
-    """Refines the peak near a grid point: value and frequency."""
+    """Value and frequency of the peak near the frequency with index ``k``."""
     low, high = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
     if not low < high < math.inf:
         return best, where

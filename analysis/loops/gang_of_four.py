@@ -12,7 +12,7 @@ from analysis.loops.linear_models import minimal_model
 from analysis.loops.open_loops import Direction, closed, cut_model
 from analysis.loops.operating_points import OperatingPoint
 
-#: First: points of the frequency grid, besides those at modes and peaks.
+#: First: number of points of the frequency grid, without those near modes and peaks.
 #: Second: lowest frequency of the grid, rad/s.
 _POINTS, _LOWEST = 800, 1e-2
 
@@ -23,15 +23,18 @@ class GangOfFour:
 
     direction: Direction
     omega: NDArray[np.float64]
-    """(n,) frequencies with all modes and peaks, up to the Nyquist frequency, rad/s."""
+    """(n,) frequencies up to the Nyquist frequency, rad/s. They show all modes and
+    peaks."""
     S: NDArray[np.complex128]
-    """(n,) sensitivity: from an estimation error to the remaining error."""
+    """(n,) sensitivity: from an error that hearing adds to the source position, to the
+    error that remains in the closed loop."""
     T: NDArray[np.complex128]
     """(n,) complementary sensitivity 1 - S."""
     PS: NDArray[np.complex128]
-    """(n,) from an acceleration that disturbs P to the position of P, m / (m/s^2)."""
+    """(n,) from a disturbing acceleration of the virtual mass to the source position
+    relative to P that hearing reports, m / (m/s^2)."""
     CS: NDArray[np.complex128]
-    """(n,) from an estimation error to the acceleration, (m/s^2) / m."""
+    """(n,) from an error of hearing to the acceleration from the law, (m/s^2) / m."""
 
     @property
     def peaks(self) -> dict[str, float]:
@@ -45,7 +48,8 @@ class GangOfFour:
 def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangOfFour:
     """Returns the closed-loop frequency responses S, T, PS and CS in one direction.
 
-    The disturbances are errors of hearing, and accelerations of the virtual mass.
+    The disturbances are errors of hearing, and accelerations that are added to that of
+    the virtual mass.
     """
     cut = cut_model(point, "sensor", "actuator")
     whole = closed(cut, cut.input_names)
@@ -64,7 +68,8 @@ def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangO
     within = [omega for omega in peaks if 0.0 < omega <= grid[-1]]
     omega = np.union1d(grid, within)
     response = part.response(omega)
-    # The signal that arrives at a cut is -T times the error, without the error itself.
+    # The signal that comes back to the cut is -T times the error. It does not contain
+    # the error itself.
     T = -response[0, 0]
     return GangOfFour(
         direction=direction,

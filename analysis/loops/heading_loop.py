@@ -1,4 +1,8 @@
-"""Stability margins of the heading loop of a robot that searches for the source."""
+"""Stability margins of the heading loop of a robot that searches for a source.
+
+Such a robot turns toward a desired heading with a PID controller while it drives. The
+heading deviation is the difference between desired and true heading.
+"""
 
 from __future__ import annotations
 
@@ -22,16 +26,22 @@ from systems.heading.parameters import MotorDriverParameters
 
 @dataclass(frozen=True)
 class HeadingLoopMargins:
-    """Margins of the loop cut at the heading deviation, with and without sampling."""
+    """Margins of the heading loop, which is cut at the heading deviation.
+
+    All values except ``continuous_phase_margin_deg`` are those of the sampled loop.
+    """
 
     tick_s: float
     crossover_rad_s: float
     phase_margin_deg: float
     delay_margin_s: float
-    """Phase margin divided by crossover frequency, s."""
+    """Phase margin, rad, divided by crossover frequency, rad/s, in s."""
     delay_margin_ticks: float
+    """Delay margin in control periods."""
     gain_margin_db: float
+    """Increase of the gain at which the loop becomes unstable, dB."""
     continuous_phase_margin_deg: float
+    """Phase margin of the loop without sampling, deg."""
 
     @property
     def phase_lost_deg(self) -> float:
@@ -50,13 +60,15 @@ def heading_loop(
     The loop has these parts:
 
     - PID controller with the output e (Song 2011, table 1)
-    - duties v +- 0.01 e of the two wheels (table 2, corrected)
-    - motors with a first-order lag
-    - heading as the integral of the difference of the wheel speeds
+    - duty cycles v +- 0.01 e of the two motors, where v is common to both (table 2,
+      corrected)
+    - motors with a first-order lag of ``lag_s``
+    - heading as the integral of the yaw rate, which is proportional to the difference
+      of the wheel speeds
 
-    As long as no limit is reached, the loop is linear in the deviation. The common
-    speed of the wheels does not turn the robot. Input and output are in deg, for
-    negative feedback. With ``tick_s`` None, the loop is continuous.
+    As long as no limit is reached, the loop is linear in the deviation and does not
+    depend on v. Input and output are in deg. The sign is that for negative feedback. If
+    ``tick_s`` is None, the loop is continuous.
     """
     full = min(motors.full_speed_m_s, robot.top_speed_m_s)
     turn = math.degrees(2.0 * 0.01 * full / robot.wheel_separation_m)
@@ -85,8 +97,9 @@ _Matrices = tuple[
 def _continuous(turn: float, lag_s: float, _: float) -> _Matrices:
     """Matrices with the states: integral of the deviation, heading, and heading rate.
 
-    Without motor lag there is no heading rate. The derivative action enters the heading
-    (or the heading rate) directly.
+    Without motor lag, the heading rate is no state. The derivative term of the PID
+    controller feeds the deviation directly to the heading. With motor lag, it feeds the
+    deviation directly to the heading rate.
     """
     kp, ki, kd = PROPORTIONAL, INTEGRAL_1_S, DIFFERENTIAL_S
     one = np.ones((1, 1))
@@ -103,10 +116,14 @@ def _continuous(turn: float, lag_s: float, _: float) -> _Matrices:
 
 
 def _sampled(turn: float, lag_s: float, tick_s: float) -> _Matrices:
-    """Matrices with states: integral, last deviation, heading, and heading rate."""
+    """Matrices with the states: integral term, last deviation, heading, heading rate.
+
+    The integral term is that of the PID controller.
+    """
     kp, ki, kd = PROPORTIONAL, INTEGRAL_1_S, DIFFERENTIAL_S
     keep = math.exp(-tick_s / lag_s) if lag_s > 0.0 else 0.0
-    # Heading and rate after one period, by the initial rate and by the command.
+    # After one period, the changes of heading and heading rate are proportional to the
+    # initial heading rate (``coast``, ``keep``) and to the command (``moved``).
     coast = lag_s * (1.0 - keep)
     moved = turn * np.array([[tick_s - coast], [1.0 - keep]])
     pid = np.array([[1.0, -kd / tick_s]])
@@ -125,7 +142,7 @@ def heading_loop_margins(
     lag_s: float,
     tick_s: float = TICK_S,
 ) -> HeadingLoopMargins:
-    """Returns the margins of ``heading_loop``."""
+    """Returns the stability margins of the heading loop; see ``heading_loop``."""
     parts = motors, robot, lag_s
     found = loop_margins(heading_loop(*parts, tick_s))
     free = loop_margins(heading_loop(*parts, None))

@@ -1,8 +1,8 @@
-"""The control loop with exact sensors as a map over one period, with derivatives.
+"""The control loop with exact sensors as a map over one control period, differentiable.
 
 The diagram has the same builder, blocks and integrator as the simulation. Only the
 sensors differ: hearing and obstacle sensing are exact, and wheel angles are not
-rounded. Therefore every block can be converted to Drake's AutoDiffXd.
+rounded. Therefore, every block can be converted to Drake's AutoDiffXd.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from diagrams.scenario.own_code import loaded_digests
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
-#: Periods after which the tracker has settled. With exact hearing, its slowest mode
-#: decays by a factor of 0.27 per period.
+#: Number of control periods after which the tracker has settled. With exact hearing,
+#: its slowest mode shrinks to 0.27 of its size in each period.
 SETTLING_TICKS = 40
 
 
@@ -43,18 +43,19 @@ SETTLING_TICKS = 40
 class PeriodDerivatives:
     """Linearization of one control period: x+ = f(x, u) and y = g(x, u).
 
-    The inputs u are held over the period. The outputs y are those at the beginning of
-    the period, before the control update.
+    x is the state before the control update that begins the period, and x+ the state
+    one period later. The inputs u are held over the period. The outputs y are those
+    before the control update that begins the period.
     """
 
     next_state: NDArray[np.float64]
-    """(n,) state one period later."""
+    """(n,) state x+ one period later."""
     A: NDArray[np.float64]
     """(n, n) derivative of the next state by the state."""
     B: NDArray[np.float64]
-    """(n, m) derivative of the next state by the inputs, held over the period."""
+    """(n, m) derivative of the next state by the inputs."""
     y: NDArray[np.float64]
-    """(p,) outputs at the beginning of the period, before the control update."""
+    """(p,) outputs before the control update."""
     C: NDArray[np.float64]
     """(p, n) derivative of the outputs by the state."""
     D: NDArray[np.float64]
@@ -64,11 +65,12 @@ class PeriodDerivatives:
 class IdealLoop:
     """Closed control loop with exact sensors, as a float and an AutoDiffXd diagram.
 
-    The AutoDiffXd diagram is converted once and used again. The state is that of the
-    diagram: first the continuous states, then the discrete groups. ``state_names``
-    names its elements. A period begins just before one control update and ends just
-    before the next. The scenario is that of ``ideal_scenario``. Raises InputError if
-    the scenario, or a user's own law, has no derivative.
+    The AutoDiffXd diagram is called the twin. It is made once, by conversion of the
+    float diagram. The state vector has first the continuous states of the diagram, then
+    its discrete groups. ``state_names`` names the elements. A period begins just before
+    one control update and ends just before the next. The scenario must have exact
+    sensors, as the result of ``ideal_scenario`` has. Raises InputError if the scenario,
+    or a user's own law, cannot be differentiated.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -93,8 +95,8 @@ class IdealLoop:
         self._try_law()
         self.state_names: tuple[str, ...] = self._names()
         self.sampled_twins: dict[str, Any] = {}
-        """Continuous blocks as AutoDiffXd maps over one period, by role. See
-        ``analysis.loops.block_models``."""
+        """Continuous blocks as AutoDiffXd blocks in discrete time, by role. Module
+        ``analysis.loops.block_models`` fills this cache."""
         self._simulators: dict[Any, Any] = {}
 
     @property
@@ -103,7 +105,7 @@ class IdealLoop:
         return self.scenario.tick_s
 
     def _require_forces(self) -> None:
-        """Raises an error if the law does not push a virtual mass."""
+        """Raises InputError if the law does not push a virtual mass."""
         block = self.follower.blocks["controller"]
         for port in ("acceleration_W", "forces_W"):
             if not block.HasOutputPort(port):
@@ -115,7 +117,7 @@ class IdealLoop:
                 )
 
     def _try_law(self) -> None:
-        """Evaluates a user's own law with AutoDiffXd, to report errors early."""
+        """Evaluates a user's own law with AutoDiffXd, to report its errors early."""
         if ":" not in self.scenario.only.law:
             return
         block = self.block("controller", twin=True)
@@ -144,11 +146,15 @@ class IdealLoop:
             ) from error
 
     def block(self, role: str, *, twin: bool = False) -> Any:
-        """Returns the block of a role in the float or the AutoDiffXd (twin) diagram."""
+        """Returns the block of a role, such as "controller".
+
+        The block is that of the float diagram, or with ``twin`` that of the AutoDiffXd
+        diagram.
+        """
         return self._twin_blocks[role] if twin else self.follower.blocks[role]
 
     def _names(self) -> tuple[str, ...]:
-        """Names ``part.element`` of all states; states without a name are numbered."""
+        """Names ``part.element`` of all states, with numbers for unnamed elements."""
         context = self.follower.diagram.CreateDefaultContext()
         continuous: list[str] = []
         discrete: list[str] = []
@@ -162,12 +168,15 @@ class IdealLoop:
         return (*continuous, *discrete)
 
     def indices(self, role: str) -> list[int]:
-        """Indices of the states of a block in the state vector."""
+        """Returns the indices of a block's states in the state vector."""
         prefix = f"{role}."
         return [k for k, n in enumerate(self.state_names) if n.startswith(prefix)]
 
     def context(self, state: NDArray[np.float64], time_s: float = 0.0) -> Any:
-        """Returns the root context at a state (n,), valid until the next call."""
+        """Returns the root context of the float diagram at a state (n,).
+
+        The context is valid until the next call of a method of this loop.
+        """
         simulator = self._simulator(frozenset(), twin=False)
         context = simulator.get_mutable_context()
         context.SetTime(time_s)
@@ -182,11 +191,11 @@ class IdealLoop:
         fixed: Mapping[Port, Sequence[float]] | None = None,
         periods: int = 1,
     ) -> NDArray[np.float64]:
-        """Returns the state (n,) after some whole periods.
+        """Returns the state (n,) after a number of whole periods.
 
-        Both states are those just before a control update. ``time_s`` is a multiple of
-        the period. The ports ``fixed`` are cut off from their source and have constant
-        values.
+        ``state`` and the result are states just before a control update. ``time_s`` is
+        the time of ``state`` and a multiple of the control period. The input ports
+        ``fixed`` are cut off from their sources and have the given constant values.
         """
         fixed = fixed or {}
         simulator = self._simulator(frozenset(fixed), twin=False)
@@ -206,10 +215,12 @@ class IdealLoop:
     ) -> PeriodDerivatives:
         """Differentiates one period with AutoDiff through the whole diagram.
 
-        The state (n,) is that just before the control update at ``time_s``, a multiple
-        of the period. The ports ``inputs`` are cut off from their source and held over
-        the period. The ports of one key share a value and its derivative. The ports
-        ``outputs`` are read before the control update.
+        ``state`` (n,) is the state just before the control update at ``time_s``, which
+        is a multiple of the control period. Each key of ``inputs`` is a tuple of input
+        ports. These ports are cut off from their sources, and all of them receive the
+        same value. The values of all keys, in their order, are the inputs u, which are
+        held over the period. The output ports ``outputs`` are read before the control
+        update.
         """
         inputs = inputs or {}
         ports = frozenset(port for group in inputs for port in group)
@@ -246,8 +257,8 @@ class IdealLoop:
         """Prepares a run of the float diagram that can be stopped at any time.
 
         The run begins at ``state`` (n,), just before the control update at ``time_s``,
-        a multiple of the period. The ports ``fixed`` are cut off from their source.
-        ``Runner.fix`` sets their values.
+        which is a multiple of the control period. The input ports ``fixed`` are cut off
+        from their sources. ``Runner.fix`` sets their values.
         """
         simulator = self._simulator(frozenset(fixed), twin=False)
         return Runner(simulator, self.fix, state, time_s, self.tick_s)
@@ -260,11 +271,12 @@ class IdealLoop:
     ) -> tuple[NDArray[np.float64], float]:
         """Returns the state (n,) after a long steady motion, and its time, s.
 
-        The robot rests or moves at constant velocity along its heading, and the source
-        follows its path. ``pose_WB`` is the pose, m and rad, at ``begin_s``, from which
-        on the source moves steadily. The law's acceleration is zero meanwhile. At the
-        end, just before a control update, the tracker and the controller's memory have
-        settled.
+        The motion lasts SETTLING_TICKS control periods. It begins at ``begin_s`` with
+        the robot at ``pose_WB``, m and rad. The acceleration from the law is replaced
+        by zero, so that the robot keeps the velocity ``v_WP``, m/s, which is zero or
+        along its heading. The source follows its path, which should be steady from
+        ``begin_s`` on. In the returned state, just before a control update, the tracker
+        and the memory of the controller have settled.
         """
         context = self.follower.diagram.CreateDefaultContext()
         state = get_state(context)
@@ -279,14 +291,15 @@ class IdealLoop:
         no_force = {("command", "acceleration_W"): (0.0, 0.0)}
         state = self.period_map(state, begin_s, fixed=no_force, periods=SETTLING_TICKS)
         time_s = begin_s + SETTLING_TICKS * self.tick_s
-        # Rounding errors would otherwise give obstacles a speed, and this a slope.
+        # Without this, rounding errors would give obstacles a tiny speed, and the
+        # derivative of the force by this speed would appear in the linear model.
         remembered = self.period_map(state, time_s, fixed=no_force)
         controller = self.indices("controller")
         state[controller] = remembered[controller]
         return state, time_s
 
     def _simulator(self, fixed: frozenset[Port], *, twin: bool) -> Any:
-        """A simulator whose context has these ports fixed, created at the first use."""
+        """Simulator for runs in which these ports are fixed; made at the first use."""
         key = (fixed, twin)
         if key not in self._simulators:
             make, diagram = (
@@ -300,7 +313,7 @@ class IdealLoop:
         return self._simulators[key]
 
     def fix(self, context: Any, port: Port, value: Any, *, twin: bool = False) -> None:
-        """Cuts an input port in a root context off from its source; sets its value."""
+        """Cuts an input port off from its source in a root context; sets its value."""
         role, name = port
         block = self.block(role, twin=twin)
         own = block.GetMyMutableContextFromRoot(context)
@@ -320,8 +333,8 @@ def _cached_loop(key: str, _own_code: str) -> IdealLoop:
 def ideal_loop(scenario: Scenario) -> IdealLoop:
     """Returns the control loop of a scenario with exact sensors (``ideal_scenario``).
 
-    Each process builds and converts the loop of a scenario only once, because Drake
-    never frees blocks that are written in Python. Callers with the same scenario share
-    it. Raises InputError if the scenario has no linear model.
+    Callers with the same scenario get the same object. Each process builds the loop of
+    a scenario only once, because Drake never frees blocks that are written in Python.
+    Raises InputError if the scenario has no linear model.
     """
     return _cached_loop(scenario.model_dump_json(), str(loaded_digests(scenario)))

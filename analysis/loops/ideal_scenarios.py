@@ -14,13 +14,16 @@ _ALL_IDEAL: dict[str, Any] = {
     "hearing": "ideal_always",
     "obstacle_sensing": "ideal",
     "plant": {"pulses_per_revolution": None},
-    # A guard that passes the law's command does not change the loop.
+    # A guard that passes the law's commands unchanged does not affect the loop.
     "guard": None,
 }
 
 
 def ideal_scenario(scenario: Scenario) -> Scenario:
-    """Returns a copy with exact sensors and a sound without pauses."""
+    """Returns a copy with exact sensors, a sound without pauses, and no guard.
+
+    Raises InputError if the wheels can slip.
+    """
     require_rolling(scenario.only.plant)
     return changed(scenario, _ALL_IDEAL)
 
@@ -38,14 +41,18 @@ def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
 
 
 def moving_bodies(scenario: Scenario) -> tuple[str, ...]:
-    """Names of the bodies that move; the source, if it moves, is last."""
+    """Names of the bodies that move. If the source moves, it is the last."""
     moving = [body.name for body in scenario.obstacles if body.path().moves]
     moving += ["source"] if scenario.source.path().moves else []
     return tuple(moving)
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """Returns a validated copy with other values, or single fields of a group."""
+    """Returns a validated copy in which ``changes`` replace fields of the scenario.
+
+    If the value of a change is a mapping, it replaces single fields of a group. Any
+    other value replaces the whole field.
+    """
     data = scenario.model_dump()
     for key, value in changes.items():
         data[key] = data[key] | value if isinstance(value, dict) else value
@@ -64,7 +71,11 @@ def require_rolling(plant: PlantParameters) -> None:
 
 
 def require_ideal(scenario: Scenario) -> None:
-    """Raises InputError if a scenario cannot be linearized."""
+    """Raises InputError if a scenario cannot be linearized.
+
+    A linear model needs one robot, one sample rate, exact sensors, rolling wheels, and
+    no guard.
+    """
     scenario.require_one_robot("a linear model")
     scenario.require_one_rate("a linear model")
     require_rolling(scenario.only.plant)

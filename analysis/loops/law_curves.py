@@ -1,7 +1,8 @@
 """Curves of the force of each law over distance and over speed, and their figure.
 
-Han 2019 describes such curves in words (figure 6), and so does Kim 2017. The figures
-themselves are missing. The forces are those of the controllers of the simulation.
+Han 2019 (figure 6) and Kim 2017 describe such curves in their texts. Their figures are
+not available to this project. The forces here are those of the simulation's
+controllers.
 """
 
 from __future__ import annotations
@@ -21,8 +22,7 @@ from systems.laws.catalog import LAWS
 
 #: Distances of the curves, m.
 DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
-#: Speeds of approach of the curves, m/s. A negative speed means that the obstacle
-#: recedes.
+#: Speeds of approach of the curves, m/s. At a negative speed, the obstacle recedes.
 SPEEDS_M_S = np.linspace(-1.0, 1.0, 201)
 #: Distance for the curves over speed, m. This distance is half of rho_0.
 AT_DISTANCE_M = 0.4
@@ -53,7 +53,8 @@ class LawCurves:
 def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
     """Computes the force curves of the named laws with the gains of a scenario."""
     closing = scenario.follower.collision_vector.velocity_term == "closing"
-    # The law sees the speed of approach, or without ``closing`` its magnitude.
+    # The law uses the speed of approach, which is at least 0, with ``closing``, and
+    # the magnitude of the speed with ``printed``.
     speeds = np.maximum(SPEEDS_M_S, 0.0) if closing else np.abs(SPEEDS_M_S)
     curves = []
     for law in laws:
@@ -74,10 +75,10 @@ def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
 
 
 def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
-    """Plots forces over the distance (left) and the speed of approach (right).
+    """Plots forces over the distance (left) and over the speed of approach (right).
 
-    The obstacle of the left panel is at rest. Curves with the velocity term ``closing``
-    are dashed.
+    On the left, the obstacle is at rest. Curves with the velocity term ``closing`` are
+    dashed and appear only on the right, because a velocity term depends on speed.
     """
     figure = Figure(figsize=(10.0, 4.0), layout="constrained")
     by_distance, by_speed = figure.subplots(1, 2)

@@ -12,26 +12,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 #: A sampled pole nearer to z = 1 than this counts as neutral. A rounding error of
-#: 1e-10 in a matrix moves a double pole by the square root, 1e-5.
+#: 1e-10 in a matrix moves a double pole by the square root of this error, 1e-5.
 NEUTRAL = 1e-5
 #: A pole nearer to z = 0 than this counts as a delay, which has no pole in the s plane.
 DELAY = 1e-6
-#: Number of matrix elements that are solved at once.
+#: Largest number of matrix elements in one call of the solver.
 _CHUNK = 100_000
-#: A new direction of a unit vector counts as rounding error if its length is below.
+#: If the part of a unit vector outside a subspace is shorter than this, the part counts
+#: as a rounding error.
 _NEGLIGIBLE = 1e-9
 
 
 @dataclass(frozen=True)
 class Mode:
-    """One real pole, or a conjugate pair, of which the fields give the upper pole."""
+    """Mode of a linear model: one real pole, or a conjugate pair of poles.
+
+    For a pair, the fields describe the pole with the positive imaginary part.
+    """
 
     z: complex | None
     """Pole in the z plane. In a continuous model: None."""
     eigenvalue: complex
     """Pole in the s plane, rad/s. In a sampled model: ln(z)/T."""
     participation: dict[str, float]
-    """Share of each state in the mode, largest first; only shares above 1 %."""
+    """Share of each state in the mode, by name of the state, largest first. Shares of
+    1 % and less are left out."""
 
     @property
     def frequency_rad_s(self) -> float:
@@ -51,7 +56,7 @@ class Mode:
 
     @property
     def settling_s(self) -> float:
-        """Settling time to 2 %, s; infinite for a mode that does not decay."""
+        """Time in which the mode decays to 2 %, s; infinite if it does not decay."""
         return 4.0 * self.time_constant_s if self.eigenvalue.real < 0.0 else math.inf
 
 
@@ -61,7 +66,8 @@ class LinearModel:
 
     Continuous time: x' = A x + B u, y = C x + D u. Sampled time, if ``period_s`` is
     set: x+ = A x + B u, y = C x + D u. All quantities are deviations from the operating
-    point, in SI units. The n states, m inputs and p outputs have names.
+    point, in SI units. With n states, m inputs and p outputs, A is (n, n), B (n, m),
+    C (p, n) and D (p, m).
     """
 
     name: str
@@ -108,7 +114,10 @@ class LinearModel:
 
     @property
     def growth_per_s(self) -> float:
-        """Growth rate of the slowest mode, 1/s; -infinity if all poles are delays."""
+        """Largest growth rate of all modes, 1/s; -infinity if all poles are delays.
+
+        The rate is negative if all modes decay.
+        """
         if self.period_s:
             return float(growth_per_s(self.spectral_radius, self.period_s))
         return float(self.poles.real.max(initial=-math.inf))
@@ -122,18 +131,18 @@ class LinearModel:
 
     @property
     def damping_ratio(self) -> float:
-        """Damping ratio of the least damped mode; 1 if no mode oscillates."""
+        """Smallest damping ratio of all modes; 1 if no mode oscillates or grows."""
         return float(damping_ratio(self.s_poles).min(initial=1.0))
 
     @property
     def settling_s(self) -> float:
-        """Time in which the slowest mode falls to 2 %, s; infinite if it grows."""
+        """Time in which the slowest mode decays to 2 %, s; infinite without decay."""
         growth = self.growth_per_s
         return -4.0 / growth if growth < 0.0 else math.inf
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """Modes of the model, slowest first, without pure delays (z = 0)."""
+        """Modes of the model without pure delays (z = 0), the slowest decay first."""
         from scipy.linalg import eig
 
         values, left, right = eig(self.A, left=True, right=True)
@@ -180,9 +189,10 @@ class LinearModel:
 def s_plane(
     poles: NDArray[np.complex128], period_s: float | None
 ) -> NDArray[np.complex128]:
-    """Returns poles in the s plane, ln(z)/T, rad/s, without pure delays (z = 0).
+    """Returns poles in the s plane, rad/s, without pure delays (z = 0).
 
-    In continuous time, where the period is None, the poles stay the same.
+    If ``period_s`` is a number T, ``poles`` are in the z plane and become ln(z)/T. If
+    it is None, ``poles`` are already in the s plane and stay the same.
     """
     poles = np.asarray(poles, dtype=np.complex128)
     if not period_s:
@@ -197,15 +207,19 @@ def growth_per_s(radius: ArrayLike, period_s: ArrayLike) -> Any:
 
 
 def damping_ratio(s: Any) -> Any:
-    """Returns -Re s/|s| of poles in the s plane, other than 0; negative if growing."""
+    """Returns the damping ratio -Re s/|s| of nonzero poles s in the s plane.
+
+    It is negative for growing modes.
+    """
     return -np.real(s) / np.abs(s)
 
 
 def simple_poles(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Returns the poles z that are neither near zero nor within 1e-4 of another pole.
 
-    A multiple pole moves by a root of a perturbation of the matrix. Two computations
-    whose matrices agree up to rounding can therefore differ in their multiple poles.
+    A small change e of a matrix can move a double pole by about sqrt(e). Two
+    computations whose matrices agree up to rounding can therefore differ noticeably in
+    their multiple poles.
     """
     distances = np.abs(poles[:, None] - poles[None, :])
     np.fill_diagonal(distances, np.inf)
@@ -218,9 +232,9 @@ def minimal_model(model: LinearModel) -> LinearModel:
 
     The frequency response stays the same. The closed loop has many states outside this
     part: the error of odometry, the angles of the wheels, and the covariances of the
-    tracker. Their poles are at z = 1 or z = 0. With these states, transfer polynomials
-    of the model would be useless. The remaining states are orthonormal combinations of
-    those of ``model``.
+    tracker. Their poles are at z = 1 or z = 0, and make transfer polynomials
+    ill-conditioned. The remaining states are orthonormal combinations of the states of
+    ``model``.
     """
     moved = _on(model, _span(model.A, model.B))
     return _on(moved, _span(moved.A.T, moved.C.T))
@@ -236,7 +250,7 @@ def _span(A: NDArray[np.float64], B: NDArray[np.float64]) -> NDArray[np.float64]
         if size == 0.0:
             continue
         vector = vector / size
-        for _ in range(2):  # twice, to remove rounding errors of the first time
+        for _ in range(2):  # the second time removes rounding errors of the first
             vector = vector - basis @ (basis.T @ vector)
         size = np.linalg.norm(vector)
         if size > _NEGLIGIBLE:

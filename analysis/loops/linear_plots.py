@@ -39,7 +39,7 @@ _KINDS = {
 
 
 def plot_equilibria(search: EquilibriumSearch) -> Figure:
-    """Plots bodies, directions of the force on P at rest, and all equilibria."""
+    """Plots bodies, streamlines of the force on P at rest, and all places of rest."""
     figure = Figure(figsize=(8.2, 6.2), layout="constrained")
     axes = figure.subplots()
     x0, x1, y0, y1 = search.area_m
@@ -165,7 +165,10 @@ def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
 
 
 def plot_nyquist(loops: Sequence[LoopMargins]) -> Figure:
-    """Plots each loop near -1, with the disk of skew 0 that the loop does not enter."""
+    """Plots L of each loop near -1, and the disk of its disk margin with skew 0.
+
+    L does not enter the disk.
+    """
     figure, cells = panels(len(loops), columns=3, size=(3.6, 3.8))
     for axes, loop in zip(cells, loops, strict=True):
         L = loop.response.L
@@ -212,7 +215,10 @@ def _size_db(L: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 
 def _phase_deg(response: FrequencyResponse) -> NDArray[np.float64]:
-    """(n,) continuous phase, shifted by full turns to the range near the crossover."""
+    """(n,) unwrapped phase, deg, shifted by full turns.
+
+    In the middle of the logarithmic frequency range, it is between -330 and 30 deg.
+    """
     omega = response.omega
     phase: NDArray[np.float64] = np.degrees(np.unwrap(np.angle(response.L)))
     middle = np.interp(math.sqrt(omega[0] * omega[-1]), omega, phase)
@@ -220,7 +226,7 @@ def _phase_deg(response: FrequencyResponse) -> NDArray[np.float64]:
 
 
 def _disk_ends(alpha: float) -> tuple[float, float]:
-    """Points left and right of -1 at which the disk of skew 0 meets the real axis."""
+    """Points at which the disk of skew 0 about -1 meets the real axis: left, right."""
     left = -(2.0 + alpha) / (2.0 - alpha) if alpha < 2.0 else -1e3
     return left, -(2.0 - alpha) / (2.0 + alpha)
 
@@ -261,7 +267,7 @@ def _contours(axes: Axes) -> None:
 
 
 def plot_gang_of_four(gang: GangOfFour) -> Figure:
-    """Plots the magnitudes of S, T, PS and CS."""
+    """Plots the magnitudes of S, T, PS and CS over frequency, and marks their peaks."""
     figure = Figure(figsize=(8.0, 5.4), layout="constrained")
     titles = {
         "S": "S: remaining error of the estimate",

@@ -1,9 +1,9 @@
 """Linear models of the closed loop at an operating point.
 
-The sampled model is computed in two independent ways. The first is AutoDiff through one
-whole period of the diagram. The second linearizes each block alone and joins the blocks
-with the ``control`` package. The continuous model uses the same blocks in the limit of
-a period that goes to zero.
+The sampled model is computed in two independent ways. The first way differentiates one
+whole control period of the diagram with AutoDiff. The second way linearizes each block
+alone, and joins the linear blocks with the ``control`` package. The continuous model
+uses the same blocks in the limit of a control period that goes to zero.
 """
 
 from __future__ import annotations
@@ -67,7 +67,10 @@ def sampled_model(point: OperatingPoint) -> LinearModel:
 
 
 def blockwise_model(point: OperatingPoint) -> LinearModel:
-    """Returns the model of ``sampled_model``, joined from blocks linearized alone."""
+    """Returns the same model as ``sampled_model``, computed in the second way.
+
+    Each block is linearized alone, and the linear blocks are joined.
+    """
     loop = point.loop
     joined = join_blocks(
         sampled_blocks(loop, point.state, point.time_s),
@@ -91,7 +94,7 @@ def blockwise_model(point: OperatingPoint) -> LinearModel:
 
 
 def _control_point(point: OperatingPoint) -> NDArray[np.float64]:
-    """(7, 7) matrix that replaces the robot's position in the outputs by p_WP."""
+    """(7, 7) matrix that turns the axle's position in the outputs into that of P."""
     epsilon = point.loop.scenario.only.robot.control_point_m
     matrix = np.eye(len(_OUTPUTS))
     matrix[0, 2] = -epsilon * math.sin(point.theta_WB)
@@ -101,15 +104,18 @@ def _control_point(point: OperatingPoint) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class RouteComparison:
-    """Differences between ``sampled_model`` and ``blockwise_model``."""
+    """Differences between the results of ``sampled_model`` and ``blockwise_model``."""
 
     matrix_difference: float
     """Largest difference of an element of A, B, C or D."""
     pole_difference: float
-    """Largest distance of a simple nonzero pole from the other model's nearest pole."""
+    """Largest distance in the z plane from one of ``simple_poles`` to the nearest pole
+    of ``blockwise_model``."""
     simple_poles: NDArray[np.complex128]
-    """Compared poles in the z plane."""
+    """Poles of ``sampled_model`` in the z plane, without multiple poles and without
+    poles near 0."""
     states: int
+    """Number of states of the models."""
 
 
 def compare_routes(point: OperatingPoint) -> RouteComparison:
@@ -128,27 +134,34 @@ def compare_routes(point: OperatingPoint) -> RouteComparison:
 
 @dataclass(frozen=True)
 class GradientCheck:
-    """Comparison of AutoDiff with finite differences of the map over one period."""
+    """Comparison of the AutoDiff matrix A with finite differences.
+
+    A is the derivative of the state after one control period by the state before it.
+    """
 
     step: float
-    """Step in each state for the differences, in its SI unit."""
+    """Size of the step in each state, in the SI unit of the state."""
     largest_difference: float
-    """Largest difference of an element of A: AutoDiff minus central differences."""
+    """Largest absolute difference between an element of A and the central difference
+    quotient."""
     largest_at: tuple[str, str]
-    """Names of two states: the one that changed, and the one that was stepped."""
+    """Element of A with the largest difference: name of the state of its row, and name
+    of the stepped state, which is that of its column."""
     kink: float
-    """Largest difference between the two one-sided slopes. If this is not near
-    zero, the loop has a corner, for example because an obstacle's speed is the norm
-    |dC/dt|."""
+    """Largest absolute difference between the two one-sided difference quotients of an
+    element. If ``kink`` is not near zero, the map over one period has a corner. For
+    example, the norm |dC/dt| has a corner, where C is the collision vector."""
     kink_at: tuple[str, str]
-    """Names of the state that changed and of the state that was stepped there."""
+    """Element with this difference, as in ``largest_at``."""
 
 
 def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:
     """Compares A with finite differences of the float diagram, state by state.
 
-    The covariances of the tracker are left out. They are zero with exact hearing, and a
-    step to one side would make them negative. ``step`` is in the SI unit of each state.
+    Some states are not stepped: those of the tracker except its poses, and the feature
+    numbers of the controller, which identify obstacles. Feature numbers are integers.
+    The covariances of the tracker are zero with exact hearing, and a step down would
+    make them negative. ``step`` is in the SI unit of each state.
     """
     loop, state, time_s = point.loop, point.state, point.time_s
     A = loop.period_derivatives(state, time_s).A
@@ -176,7 +189,7 @@ def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:
 
 
 def _can_step(name: str) -> bool:
-    """Whether a small step of a state in both directions leaves the map smooth."""
+    """Whether ``check_gradient`` steps the state of this name."""
     role, _, element = name.partition(".")
     if role == "controller":
         return "feature" not in element
@@ -189,9 +202,10 @@ def continuous_model(point: OperatingPoint) -> LinearModel:
     The blocks are those of the sampled model. In this limit, odometry and hearing are
     exact and without delay, and the virtual mass becomes an integrator.
 
-    - States: pose and wheel speeds of the plant, velocity of the virtual mass.
-    - Inputs: position of the source, m, and an acceleration added to that of the
-      virtual mass, m/s^2.
+    - States: pose of the robot, m and rad, wheel speeds, rad/s, and velocity of the
+      virtual mass, m/s.
+    - Inputs: position of the source, m, and an acceleration, m/s^2, that is added to
+      that of the virtual mass.
     - Outputs: position of the control point P, m, and heading, rad.
     """
     loop = point.loop
@@ -240,7 +254,7 @@ def _signals(names: Sequence[str], port: str) -> list[int]:
 
 
 def _slope(model: LinearModel, of: str, by: str) -> NDArray[np.float64]:
-    """Derivative of an output port by an input port in the same period."""
+    """Derivative of an output port by an input port at the same control update."""
     rows, columns = _signals(model.output_names, of), _signals(model.input_names, by)
     return model.D[np.ix_(rows, columns)]
 
@@ -250,9 +264,9 @@ def plant_jacobians(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Returns A (7, 7) and B (7, 2) of the plant in continuous time.
 
-    They are the derivatives of the state's rate by the state, and by the two commanded
-    wheel speeds. They are constant, because the robot rests or drives straight at an
-    operating point.
+    They are the derivatives of the state's time derivative: A by the state, and B by
+    the two commanded wheel speeds. Both matrices are constant in time, because the
+    robot rests or drives straight at an operating point.
     """
     loop = point.loop
     plant = loop.block("plant", twin=True)

@@ -1,9 +1,10 @@
 """Stability margins of a loop: gain, phase, modulus, disk and delay margins.
 
-The matrices of the loop give the crossovers and peaks (``frequency_levels``), in
-continuous and in sampled time. Therefore no crossover or peak is missed between two
-points of a frequency grid or outside the grid. Gain and phase margins are two-sided,
-because a loop with an unstable plant also becomes unstable if its gain is too low.
+Crossovers and peaks are computed from the matrices of the loop (module
+``frequency_levels``), in continuous and in sampled time. A frequency grid alone could
+miss a crossover or a peak between two of its points or outside the grid. Gain and phase
+margins are two-sided, because a loop with an unstable plant also becomes unstable if
+its gain is too low.
 """
 
 from __future__ import annotations
@@ -35,21 +36,21 @@ from analysis.loops.open_loops import (
 from analysis.loops.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
 
-#: Skews of the disk margins, for gain reduction (-1), for reduction and increase alike
-#: (0), and for gain increase (1).
+#: Skews of the disk margins. -1 emphasizes reductions of the gain, 1 emphasizes
+#: increases, and 0 treats reductions and increases alike.
 SKEWS = (-1.0, 0.0, 1.0)
-#: If |L| is below this at all frequencies, there is no loop.
+#: If |L| is below this at all frequencies, no signal comes back, and there is no loop.
 _NO_LOOP = 1e-9
 
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """Frequency response of a loop."""
+    """Frequency response of a loop transfer function L."""
 
     omega: NDArray[np.float64]
-    """(n,) rad/s."""
+    """(n,) frequencies, rad/s."""
     L: NDArray[np.complex128]
-    """(n,)"""
+    """(n,) values of L at these frequencies."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +67,10 @@ class DiskMargin:
     skew: float
     """Skew of the disk. With 0, gain increase and gain reduction count alike."""
     alpha: float
-    """Size of the disk. If the closed loop is unstable: 0."""
+    """Largest size of the disk for which the loop stays stable. If the closed loop
+    itself is unstable: 0."""
     frequency_rad_s: float
-    """Frequency at which the loop is nearest to the disk, rad/s."""
+    """Frequency at which the smallest destabilizing factor acts, rad/s."""
 
     def to_dict(self) -> dict[str, float]:
         """Values for the JSON document."""
@@ -80,23 +82,23 @@ class DiskMargin:
 
     @property
     def gain_low(self) -> float:
-        """Smallest permitted gain factor; 0 if the gain may vanish."""
+        """Smallest gain factor in the disk; 0 if even a vanishing gain is in it."""
         return max(0.0, self._ends[0])
 
     @property
     def gain_high(self) -> float:
-        """Largest permitted gain factor; infinite without a limit."""
+        """Largest gain factor in the disk; infinite if there is no limit."""
         return self._ends[1]
 
     @property
     def gain_margin_db(self) -> float:
-        """Permitted change of the gain in either direction, dB."""
+        """Change of the gain that is permitted in both directions, dB."""
         return _least_db(self.gain_low, self.gain_high)
 
     @property
     def phase_margin_deg(self) -> float:
-        """Permitted change of the phase in either direction, deg."""
-        # Phase at which the circle |d| = alpha gives the factor exp(j phase).
+        """Change of the phase that is permitted in both directions, deg."""
+        # Some d with |d| = alpha gives the factor exp(j phase) with this phase.
         if self.alpha == math.inf:
             return math.inf
         squared = self.alpha**2
@@ -116,33 +118,42 @@ class DiskMargin:
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Stability margins of a loop; the defaults are those of an unstable loop."""
+    """Stability margins of a loop.
+
+    The default values of the fields are those of an unstable closed loop.
+    """
 
     name: str
+    """Name of the loop."""
     model: LinearModel = field(repr=False)
     """Loop transfer function L."""
     stable: bool = False
+    """Whether the closed loop is stable."""
     gain_increase_margin: float = 1.0
     """Gain factor above 1 at which the loop becomes unstable; infinite if none does."""
     gain_reduction_margin: float = 1.0
     """Gain factor below 1 at which the loop becomes unstable; 0 if none does."""
     phase_lag_margin_deg: float = 0.0
-    """Smallest destabilizing phase lag at a gain crossover, deg; infinite if none."""
+    """Smallest phase lag, deg, at a gain crossover that makes the loop unstable.
+    Without a crossover: infinity."""
     phase_lead_margin_deg: float = 0.0
-    """Smallest destabilizing phase lead at a gain crossover, deg; infinite if none."""
+    """Smallest phase lead, deg, at a gain crossover that makes the loop unstable.
+    Without a crossover: infinity."""
     crossover_rad_s: float = math.nan
-    """Gain crossover of the phase margin, rad/s. Without a crossover: NaN."""
+    """Gain crossover that determines the phase margin, rad/s. Without a crossover:
+    NaN."""
     delay_margin_s: float = 0.0
-    """Delay margin, s: smallest ratio of phase lag margin, rad, to frequency, rad/s,
-    over all gain crossovers. The value is exact in continuous time. For sampled loops
-    see ``analysis.loops.delay_margin``."""
+    """Delay margin, s: smallest ratio of phase lag, rad, to frequency, rad/s, over all
+    gain crossovers. The value is exact for continuous loops. Module
+    ``analysis.loops.delay_margin`` computes the exact value for sampled loops."""
     modulus_margin: float = 0.0
-    """Smallest distance of L from -1."""
+    """Smallest distance of L from -1 over all frequencies."""
     modulus_frequency_rad_s: float = math.nan
+    """Frequency at which L is nearest to -1, rad/s."""
     sensitivity_peak: float = math.inf
-    """Largest |S| (M_s)."""
+    """Largest |S| over all frequencies (M_s), where S = 1/(1 + L)."""
     complementary_peak: float = math.inf
-    """Largest |T| (M_t)."""
+    """Largest |T| over all frequencies (M_t), where T = L/(1 + L)."""
     disks: tuple[DiskMargin, ...] = tuple(
         DiskMargin(skew, 0.0, math.nan) for skew in SKEWS
     )
@@ -150,7 +161,7 @@ class LoopMargins:
 
     @cached_property
     def response(self) -> FrequencyResponse:
-        """Frequency response for figures."""
+        """Frequency response with enough points for figures."""
         return frequency_response(self.model)
 
     @property
@@ -180,13 +191,13 @@ class LoopMargins:
 
 
 def _least_db(low: float, high: float) -> float:
-    """Smaller distance from 1 to either end of an interval of gain factors, dB."""
+    """Distance from 1 to the nearer end of an interval of gain factors, dB."""
     down = 20.0 * math.log10(1.0 / low) if low > 0.0 else math.inf
     return min(down, 20.0 * math.log10(high))
 
 
 def frequency_response(model: LinearModel) -> FrequencyResponse:
-    """Returns the response at all modes of the open and the closed loop."""
+    """Returns the response on a grid that shows all modes of open and closed loop."""
     omega = _grid(model, GRID_POINTS)
     return FrequencyResponse(omega, model.response(omega)[0, 0])
 
@@ -198,13 +209,19 @@ def _grid(model: LinearModel, points: int) -> NDArray[np.float64]:
 
 
 def is_loop(model: LinearModel) -> bool:
-    """Whether any signal comes back: |L| is more than rounding errors."""
+    """Returns whether |L| is larger than rounding errors at some frequency.
+
+    Otherwise, no signal comes back to the cut, and there is no loop.
+    """
     omega = _grid(model, SEARCH_POINTS)
     return bool(np.abs(model.response(omega)[0, 0]).max() > _NO_LOOP)
 
 
 def loop_margins(model: LinearModel) -> LoopMargins:
-    """Computes all margins of a loop L with one input and output, negative feedback."""
+    """Computes all margins of a loop transfer function L under negative feedback.
+
+    Raises InputError if L does not have exactly one input and one output.
+    """
     if model.B.shape[1] != 1 or model.C.shape[0] != 1:
         raise InputError(
             f"{model.name}",
@@ -217,7 +234,7 @@ def loop_margins(model: LinearModel) -> LoopMargins:
     omega = _grid(model, SEARCH_POINTS)
     upper, lower = _gain_margins(model, T, omega)
     lag, lead, crossover, delay = _phase_margins(model, T, omega)
-    # S = 1 - T, and the disk of a skew is the smallest 1/|S + (skew - 1)/2|.
+    # S = 1 - T. The size of the disk is the smallest 1/|S + (skew - 1)/2|.
     peaks = [peak(T, (1.0 + skew) / 2.0) for skew in SKEWS]
     disks = tuple(
         DiskMargin(skew, 1.0 / largest if largest > 0.0 else math.inf, where)
@@ -243,7 +260,7 @@ def loop_margins(model: LinearModel) -> LoopMargins:
 
 
 def _complementary(model: LinearModel) -> LinearModel:
-    """T = L/(1 + L). If the loop is stable, T has no poles on the stability border."""
+    """T = L/(1 + L). If the closed loop is stable, all poles of T decay."""
     share = 1.0 / (1.0 + model.D[0, 0])
     return replace(
         model,
@@ -257,13 +274,14 @@ def _complementary(model: LinearModel) -> LinearModel:
 def _gain_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Smallest gain above 1 and largest below 1 that put a pole on the border."""
-    # L is real where T is.
+    """Smallest gain factor above 1, and largest below 1, that destabilize the loop."""
+    # L is real at the frequencies at which T is real.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, -1j, 0.0))))
     at = crossings(found, lambda w: model.response(w)[0, 0].imag)
     values = list(model.response(at)[0, 0].real) if at else []
-    # L is also real at both ends of the border. An integrating loop has T = 1 at zero
-    # frequency, where L is infinite: no gain above 0 is too small.
+    # L is also real at both ends of the frequency range. At zero frequency, an
+    # integrating loop has T = 1 and infinite L. This end is left out, because no gain
+    # makes L equal to -1 there.
     ends = [0.0, math.pi / T.period_s] if T.period_s else [0.0]
     values += [
         t / (1.0 - t) for t in T.response(ends)[0, 0].real if abs(1.0 - t) > _NO_LOOP
@@ -283,7 +301,10 @@ def _gain_margins(
 def _phase_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """Smallest lag and lead, rad, frequency of the smaller, rad/s, and delay, s."""
+    """Margins of phase lag, rad, and phase lead, rad, crossover, rad/s, and delay, s.
+
+    The crossover is that of the smaller of both phase margins.
+    """
     # |L| = 1 where the real part of T is 1/2.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))
     at = crossings(found, lambda w: np.abs(model.response(w)[0, 0]) - 1.0)
@@ -296,7 +317,7 @@ def _phase_margins(
         lag, lead = min(lag, behind), min(lead, ahead)
         delay = min(delay, behind / w)
     if not model.period_s and abs(model.D[0, 0]) >= 1.0:
-        # There are crossovers at arbitrarily high frequencies: any delay destabilizes.
+        # |L| stays at 1 or above at high frequencies, where any delay destabilizes.
         delay = 0.0
     return lag, lead, where, delay
 
@@ -308,15 +329,15 @@ class PointMargins:
     at: BreakPoint
     direction: Direction
     margins: LoopMargins
-    """The loop of the other direction is closed."""
+    """Margins of this loop, while the loop of the other direction is closed."""
 
 
 def all_margins(point: OperatingPoint) -> tuple[PointMargins, ...]:
     """Computes the stability margins with the loop cut at sensor, actuator and wheels.
 
-    Each cut gives two loops: along the line to the source, and across this line. Loops
-    that do not exist are left out. For example, without repulsion no force acts across
-    the line at the follow distance.
+    Each cut gives two loops: along the line to the source, and across this line. A loop
+    in which no signal comes back is left out. For example, without a push of an
+    obstacle, no force acts across the line at the follow distance.
     """
     found = []
     for at in BREAK_POINTS:

@@ -47,10 +47,13 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
     """Returns the sampled linear model of the control loop with some signals cut.
 
     A signal is cut between the block that produces the signal and the block that reads
-    it. At each cut, the input ``<place>_<direction>`` feeds the reading block. The
-    output of the same name is the signal from the producing block. Each cut has two of
-    both, along and across. At the operating point the robot faces the source, so that
-    "along" means ahead. Without cuts, the model is that of the closed loop.
+    the signal. Each of ``places`` adds two inputs and two outputs to the model: one of
+    each for each of ``DIRECTIONS``. The input ``<place>_<direction>`` feeds the reading
+    block. The output of the same name is the signal from the producing block. At the
+    operating point, the robot faces the source, so "along" means ahead. For the wheels,
+    "along" is the sum of both wheel speeds over sqrt(2), and "across" is the right
+    minus the left wheel speed over sqrt(2). Without ``places``, the model is that of
+    the closed loop.
     """
     loop = point.loop
     now = loop.context(point.state, point.time_s)
@@ -72,7 +75,8 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
     )
     C, D = found.C, found.D
     if "wheels" in places:
-        # The wheels receive the command as updated in the same control period.
+        # The control update at the start of the period computes the wheel command. The
+        # plant already receives this command in the same period.
         at = 2 * places.index("wheels")
         C = np.insert(C, [at, at], found.A[wheels], axis=0)
         D = np.insert(D, [at, at], found.B[wheels], axis=0)
@@ -92,7 +96,7 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
 
 
 def _axes(point: OperatingPoint, place: BreakPoint) -> NDArray[np.float64]:
-    """(2, 2) rotation of a signal's two values to along (row 0) and across (row 1)."""
+    """(2, 2) matrix from the two elements of a signal to "along" and "across"."""
     if place == "wheels":
         return np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
     if place == "sensor":
@@ -101,10 +105,11 @@ def _axes(point: OperatingPoint, place: BreakPoint) -> NDArray[np.float64]:
 
 
 def closed(model: LinearModel, signals: tuple[str, ...]) -> LinearModel:
-    """Closes the loop again at some cut signals of a model.
+    """Closes the loop again at some of the signals that ``cut_model`` has cut.
 
-    Each name is that of an input and of the output that is connected to this input. The
-    inputs remain, and each is added to its signal.
+    For each name in ``signals``, the output of this name is connected to the input of
+    the same name. The input remains an input of the model. Its value is added to the
+    value from the output.
     """
     import control
 
@@ -120,9 +125,10 @@ def open_loop(
     at: BreakPoint = "sensor",
     direction: Direction = "along",
 ) -> LinearModel:
-    """Returns the loop L of one direction, for negative feedback.
+    """Returns the loop transfer function L of one direction, cut at one signal.
 
-    The loop of the other direction stays closed.
+    The loop of the other direction stays closed. The sign of L is that for negative
+    feedback.
     """
     whole = cut_model(point, at)
     own = f"{at}_{direction}"
@@ -133,14 +139,15 @@ def open_loop(
 
 
 def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
-    """Returns the loop transfer function L of the ideal target loop.
+    """Returns the loop transfer function L of a point mass that the source attracts.
 
-    The target loop has no obstacle, no motor lag and no sampling. It is a point mass
-    that the attraction's spring and damper act on, along the line to a source at rest.
-    Stiffness and damping are the slopes of the controller's force. If the loop is cut
-    at the ``sensor``, the damping loop stays closed. If it is cut at the ``actuator``,
-    spring and damper are both cut. The states are position, m, and velocity, m/s.
-    Raises InputError if the stiffness is zero.
+    This ideal loop has no obstacle, no motor lag and no sampling. The attraction acts
+    on the mass as a spring and a damper along the line to a source at rest. Stiffness
+    and damping are derivatives of the controller's force by position and by velocity.
+    A cut at the ``sensor`` opens the loop of the spring, and the loop of the damper
+    stays closed. A cut at the ``actuator`` or at the ``wheels`` opens both loops. The
+    states are position, m, and velocity, m/s. Raises InputError if the stiffness is
+    zero.
     """
     if scenario.follower.attraction.stiffness_n_m == 0.0:
         raise InputError(
@@ -168,7 +175,10 @@ def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
 
 
 def _attraction_slopes(scenario: Scenario) -> tuple[float, float]:
-    """Stiffness, N/m, and damping, N s/m, towards a source at rest, no obstacles."""
+    """Stiffness, N/m, and damping, N s/m, along the line to a source at rest.
+
+    The scenario's obstacles are left out.
+    """
     distance = scenario.follower.attraction.follow_distance_m + 2.0
     alone = {
         "law": "none",

@@ -1,8 +1,8 @@
 """Operating points: equilibria of the closed loop at rest and while following.
 
-At rest, the robot may have any heading. Equilibria at rest therefore form continua with
-one pole at z = 1. The models here describe the motion of the control point P alone, and
-so do not contain this pole.
+At an equilibrium at rest, the robot may have any heading. The linear model of the whole
+loop therefore has a pole at z = 1. The models in this module describe only the motion
+of the control point P, and do not contain this pole.
 """
 
 from __future__ import annotations
@@ -34,28 +34,29 @@ Kind = Literal["sink", "saddle", "source"]
 
 #: A force below this counts as zero, N.
 NO_FORCE_N = 1e-9
-#: If the smallest stiffness is below this share of the largest, the equilibrium is
-#: part of a continuum.
+#: If the smallest principal stiffness is below this share of the largest, the
+#: equilibrium is part of a continuum.
 FLAT = 1e-6
-#: Time after which the source has started and drives straight up to rounding errors, s.
+#: Time after which the source drives straight at constant speed, up to rounding errors,
+#: s.
 _STEADY_S = 20.0
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Equilibrium of the closed loop, at rest or at the source's constant velocity."""
+    """Equilibrium of the loop: the robot rests, or follows at constant velocity."""
 
     loop: IdealLoop = field(repr=False)
     p_WP: NDArray[np.float64]
     """(2,) position of the control point P in W at ``time_s``, m."""
     theta_WB: float
-    """Heading, rad: towards the source. At rest, any other is an equilibrium too."""
+    """Heading towards the source, rad. At rest, P is in equilibrium at any heading."""
     v_WS: NDArray[np.float64]
-    """(2,) velocity of both source and robot in W, m/s."""
+    """(2,) velocity of the source in W, m/s. The robot has the same velocity."""
     force_n: float
-    """Remaining force at the equilibrium, N."""
+    """Force that remains on P at the numerical solution, N."""
     stiffness_n_m: NDArray[np.float64]
-    """(2, 2) negative derivative of the force by position, N/m."""
+    """(2, 2) negative derivative of the force on P by the position of P, N/m."""
     state: NDArray[np.float64] = field(repr=False)
     """(n,) state of the diagram, just before a control update."""
     time_s: float
@@ -78,7 +79,7 @@ class OperatingPoint:
 
     @property
     def offset_m(self) -> float:
-        """Distance between P and the source, minus ``follow_distance_m``, m."""
+        """Distance between P and the source, minus the follow distance, m."""
         return (
             self.source_distance_m
             - self.loop.scenario.follower.attraction.follow_distance_m
@@ -86,13 +87,13 @@ class OperatingPoint:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """(2, 2) unit vectors in W: row 0 towards the source, row 1 across."""
+        """(2, 2) unit vectors in W: row 0 towards the source, row 1 to the left."""
         c, s = math.cos(self.theta_WB), math.sin(self.theta_WB)
         return np.array([[c, s], [-s, c]])
 
     @property
     def continuum(self) -> bool:
-        """Whether P is free to move along a curve, for example around the source."""
+        """Whether P can rest along a curve, for example a circle around the source."""
         sizes = np.abs(np.linalg.eigvals(self.stiffness_n_m))
         return bool(sizes.min() < FLAT * max(sizes.max(), 1.0)) and not self.moves
 
@@ -100,16 +101,17 @@ class OperatingPoint:
     def motion(self) -> LinearModel:
         """Sampled model of the motion of the control point P in the closed loop.
 
-        - Inputs: change of the velocity of the virtual mass along x and y of the world
-          frame W, m/s.
-        - Outputs: position of P in W, m. If the robot moves, also the heading, rad.
+        - Inputs: sudden changes of the velocity of the virtual mass along x and y of
+          the world frame W, m/s.
+        - Outputs: position of P in W, m. If the operating point moves, also the
+          heading, rad.
         """
         A = self.loop.period_derivatives(self.state, self.time_s).A
         return motion_model(self, A, self.loop.tick_s)
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
-        """Modes of the motion, slowest first, without neutral modes (z = 1)."""
+        """Modes of the motion without neutral ones (z = 1), the slowest decay first."""
         return tuple(
             mode
             for mode in self.motion.modes
@@ -118,7 +120,7 @@ class OperatingPoint:
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
-        """Poles ln(z)/T of the motion in the s plane, rad/s, without neutral ones."""
+        """Poles ln(z)/T of the motion, rad/s, without neutral poles (z = 1)."""
         poles = self.motion.poles
         return s_plane(poles[np.abs(poles - 1.0) > NEUTRAL], self.loop.tick_s)
 
@@ -131,9 +133,9 @@ class OperatingPoint:
     def kind(self) -> Kind:
         """Kind of the equilibrium, by the number of growing modes of the motion.
 
-        Without a growing mode the point is a sink, with one a saddle, with two or more
-        a source. A growing oscillation counts as one mode, as a growing exponential
-        does.
+        Without growing modes, the point is a ``sink``. With one, it is a ``saddle``.
+        With two or more, it is a ``source``; this term has nothing to do with the
+        source of sound. A growing oscillation counts as one mode.
         """
         growing = self.eigenvalues[self.eigenvalues.real >= 0.0]
         directions = int(np.sum(growing.imag >= -1e-9))
@@ -147,7 +149,7 @@ class OperatingPoint:
 
     @property
     def nearest_body(self) -> str:
-        """Name of the nearest body."""
+        """Name of the body nearest to P."""
         return min(self._distances(), key=lambda item: item[1])[0]
 
     def _distances(self) -> list[tuple[str, float]]:
@@ -167,10 +169,11 @@ class OperatingPoint:
 def motion_model(
     point: OperatingPoint, A: NDArray[np.float64], period_s: float
 ) -> LinearModel:
-    """Returns a model of the motion of P from the (n, n) map of the whole loop.
+    """Returns a model of the motion of P alone.
 
-    The map is over one ``period_s``. The model has the controllable and observable
-    states only, and the signals of ``OperatingPoint.motion``.
+    ``A`` (n, n) maps deviations of the state of the whole loop over ``period_s``, s.
+    The model has the signals of ``OperatingPoint.motion``, and only the controllable
+    and observable states.
     """
     names = point.loop.state_names
     kick = [names.index(f"command.v_WP_{axis}") for axis in "xy"]
@@ -232,11 +235,12 @@ def moving_equilibrium(
 ) -> OperatingPoint:
     """Returns the equilibrium of following a source at constant velocity.
 
-    The source drives straight on, by default with ``source.speed_m_s`` along x. The
-    robot follows on the line behind the source and heads in the direction of motion.
-    Obstacles are left out, because none moves with the robot, and sensors are taken as
-    exact. Raises InputError if the source is too fast or at rest, or the forces balance
-    at no distance.
+    The source drives straight on at ``velocity_W`` in W, m/s. By default, the speed is
+    ``source.speed_m_s`` and the direction is x. The robot follows straight behind the
+    source and heads in the direction of motion. Obstacles are left out, because none
+    moves with the robot. The calculation assumes exact sensors. Raises InputError if
+    the source is at rest, or not slower than the top speed of the robot, or if the
+    forces balance at no distance.
     """
     vx, vy = velocity_W or (scenario.source.speed_m_s, 0.0)
     speed, top = math.hypot(vx, vy), scenario.only.robot.top_speed_m_s
@@ -260,7 +264,7 @@ def moving_equilibrium(
         return loop.settled_state(pose, (vx, vy), _STEADY_S)
 
     def pull(distance: float) -> float:
-        """Acceleration of P towards the source, m/s^2."""
+        """Acceleration from the law towards the source at a distance in m, m/s^2."""
         state, time_s = settled(distance)
         read = [("controller", "acceleration_W")]
         return float(loop.period_derivatives(state, time_s, outputs=read).y @ heading)

@@ -4,11 +4,13 @@ The control point P, ahead of the wheel axle, is a point mass in continuous time
 
     M p'' = F_m + sum of f(c, s) u,   |p'| <= top speed
 
-F_m is the attraction, c the distance from an obstacle, s the relative speed, and u the
-direction of the push. The model takes the nearest point of every body as exactly known.
-Obstacles rest, and there is neither motor lag nor sampling. Force and energy of the law
-are those of ``RadialLaw``. The attraction is that of
-``systems.laws.impedance.attraction_force``.
+F_m is the force of the attraction. f(c, s) is the force of the law, with the distance c
+of an obstacle and its relative speed s. The unit vector u points away from the
+obstacle. The sum is over all bodies, or has only the term of the nearest body. The
+model assumes that the nearest point of every body is known exactly, and that obstacles
+rest. It has neither motor lag nor sampling. ``RadialLaw`` gives the force and the
+energy of the law. ``systems.laws.impedance.attraction_force`` is the same attraction in
+the simulation.
 """
 
 from __future__ import annotations
@@ -27,8 +29,9 @@ from systems.world.geometry import control_point, nearest_point_on_rectangle
 
 VelocityTermModel = Literal["none", "printed", "closing"]
 _TERMS = {"none": 0, "printed": 1, "closing": 2}
-#: Runge-Kutta step of ``PointMass.run``, s. In this time the stiffest contact mode
-#: that the margins allow advances by a twentieth of a radian.
+#: Step of the Runge-Kutta method of ``PointMass``, s. In one step, the fastest
+#: oscillation against an obstacle that the stability margins allow advances by 1/20
+#: rad.
 STEP_S = 0.02
 
 
@@ -53,30 +56,33 @@ class PointMassRuns:
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """Point-mass model of a scenario's gains, with the bodies as they are at 0 s."""
+    """Point-mass model of a scenario. All bodies rest where they are at 0 s."""
 
     law: RadialLaw
-    """Repulsion, tabulated by distance."""
+    """Force of the law away from a body, as tables."""
     rectangles: NDArray[np.float64]
-    """(n, 5) bodies in W: x, y, theta, length, width, in m and rad; the source last."""
+    """(n, 5) bodies in W: x, y, theta, length, width, in m and rad. The body of the
+    source is the last row."""
     p_WS: NDArray[np.float64]
     """(2,) position of the source in W, m."""
     p_WP: NDArray[np.float64]
-    """(2,) control point P at the start in W, m."""
+    """(2,) position of the control point P at the start in W, m."""
     stiffness_n_m: float
-    """K_r."""
+    """Stiffness K_r of the attraction, N/m."""
     damping_n_s_m: float
-    """D_r."""
+    """Damping D_r of the attraction, N s/m."""
     follow_distance_m: float
-    """d_f."""
+    """Follow distance d_f, m."""
     mass_kg: float
+    """Virtual mass M, kg."""
     top_speed_m_s: float
+    """Top speed of P, m/s."""
     all_bodies: bool
     """Whether all bodies push P. If false, only the nearest one pushes."""
 
     @property
     def top_kinetic_energy_j(self) -> float:
-        """M v^2 / 2 at the top speed."""
+        """Kinetic energy M v^2 / 2 at the top speed, J."""
         return 0.5 * self.mass_kg * self.top_speed_m_s**2
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
@@ -90,23 +96,26 @@ class PointMass:
         return self.distances(points).min(axis=1)
 
     def obstacle_energy(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) potential energies of the repulsion at (n, bodies) distances, J."""
+        """(n,) potential energies of the push, J, at (n, bodies) distances, m."""
         energies = self.law.energy(distances)
         return energies.sum(axis=1) if self.all_bodies else energies.max(axis=1)
 
     def attraction_energy(self, source_distance: ArrayLike) -> NDArray[np.float64]:
-        """K_r (r - d_f)^2 / 2 at distances r from the source, J."""
+        """Energy K_r (r - d_f)^2 / 2, J, at distances r from the source, m."""
         stretch = np.asarray(source_distance) - self.follow_distance_m
         return 0.5 * self.stiffness_n_m * stretch**2
 
     def potential(self, points: ArrayLike) -> NDArray[np.float64]:
-        """(n,) potential energy at points (n, 2), J."""
+        """(n,) potential energies of attraction and push at points (n, 2) in W, J."""
         points = np.asarray(points, dtype=float)
         r = np.hypot(*(points - self.p_WS).T)
         return self.attraction_energy(r) + self.obstacle_energy(self.distances(points))
 
     def energy(self, states: ArrayLike) -> NDArray[np.float64]:
-        """(n,) energies V of states (n, 4), J: kinetic plus potential."""
+        """(n,) sums V of kinetic and potential energy of states (n, 4), J.
+
+        The states are x, y, vx, vy in W, m and m/s.
+        """
         states = np.asarray(states, dtype=float)
         kinetic = 0.5 * self.mass_kg * np.sum(states[:, 2:] ** 2, axis=1)
         return kinetic + self.potential(states[:, :2])
@@ -114,9 +123,10 @@ class PointMass:
     def force(self, states: ArrayLike, term: VelocityTermModel) -> NDArray[np.float64]:
         """Returns the (n, 2) sum of all forces on the point mass in W, N.
 
-        ``states`` are (n, 4) x, y, vx, vy in W, m and m/s. The repulsion takes the
-        speed as zero with ``term`` ``none``, |dC/dt| with ``printed``, and the speed of
-        approach with ``closing``. C is the vector to the nearest point of a body.
+        ``states`` are (n, 4) x, y, vx, vy in W, m and m/s. ``term`` selects the speed s
+        in the force f(c, s) of the law: zero for ``none``, |dC/dt| for ``printed``, and
+        the speed of approach for ``closing``. C is the vector to the nearest point of a
+        body.
         """
         states = np.ascontiguousarray(states, dtype=float)
         return kernels.forces(states, self._world(term))
@@ -129,12 +139,13 @@ class PointMass:
         duration_s: float = 40.0,
         term: VelocityTermModel,
     ) -> PointMassRuns:
-        """Integrates from each start until contact or until the end of the time.
+        """Simulates from each start until P touches a body or ``duration_s`` is over.
 
         The method is classical Runge-Kutta with fixed steps of STEP_S. After each step,
-        |v| is limited to the top speed. In the limit of short steps this equals the
-        speed limit of the model. ``starts`` and ``term`` are those of ``force``. The
-        point mass touches a body at the distance ``contact_m``.
+        |v| is limited to the top speed. As the step goes to zero, the motion converges
+        to that of the model with its speed limit. ``starts`` are states as in
+        ``force``, and ``term`` is that of ``force``. P touches a body at distances up
+        to ``contact_m``.
         """
         starts = np.ascontiguousarray(starts, dtype=float)
         steps = round(duration_s / STEP_S)
@@ -148,8 +159,8 @@ class PointMass:
     ) -> NDArray[np.float64]:
         """Returns the (steps + 1, 4) states from one start at intervals of STEP_S.
 
-        ``start`` and ``term`` are those of ``force``. Contact with a body does not end
-        the run.
+        ``start`` is one state as in ``force``, and ``term`` is that of ``force``.
+        Contact with a body does not end the run.
         """
         start = np.ascontiguousarray(start, dtype=float)
         steps = round(duration_s / STEP_S)
@@ -169,17 +180,17 @@ class PointMass:
         return self._bodies(), self.p_WS, gains, tables
 
     def _bodies(self) -> NDArray[np.float64]:
-        """(n, 6) bodies: center, cosine and sine of the heading, half extents."""
+        """(n, 6) bodies: center, cosine and sine of heading, half length and width."""
         x, y, theta, length, width = self.rectangles.T
         half = 0.5 * np.array([length, width])
         return np.stack([x, y, np.cos(theta), np.sin(theta), *half], axis=1)
 
 
 def point_mass(scenario: Scenario) -> PointMass:
-    """Builds the point-mass model of a scenario, with the bodies as they are at 0 s.
+    """Builds the point-mass model of a scenario. All bodies rest as they are at 0 s.
 
-    Raises InputError if the law is not known or has no radial force, or if the pushes
-    of more than three bodies are added (``aggregation: sum``).
+    Raises InputError if the law is not known or has no radial force, or if the scenario
+    adds the pushes of bodies (``aggregation: sum``) and has more than three bodies.
     """
     bodies = scenario.bodies()
     all_bodies = scenario.follower.collision_vector.aggregation == "sum"

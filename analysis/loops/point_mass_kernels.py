@@ -27,7 +27,8 @@ _Gains = tuple[float, ...]
 _Tables = tuple[_Array, _Array, _Array]
 _World = tuple[_Array, _Array, _Gains, _Tables]
 
-#: Number of parts of an integration step in which the nearest body changes.
+#: If the nearest body changes in an integration step, the step is repeated in this
+#: number of parts.
 _SWITCH_PARTS = 32
 
 
@@ -35,7 +36,11 @@ _SWITCH_PARTS = 32
 def _nearest(
     x: float, y: float, body: _Array
 ) -> tuple[float, float, float, bool]:  # pragma: no cover  (compiled)
-    """Vector to the nearest point, its length, and whether the point is a corner."""
+    """Vector from (x, y) to the nearest point of a body, in W, m.
+
+    The four values are x and y of the vector, its length, and whether the nearest point
+    is a corner of the body.
+    """
     dx, dy = x - body[0], y - body[1]
     u, v = body[2] * dx + body[3] * dy, -body[3] * dx + body[2] * dy
     du, dv = -beyond(u, body[4]), -beyond(v, body[5])
@@ -59,7 +64,7 @@ def _lookup(table: _Array, c: float) -> float:  # pragma: no cover  (compiled)
 def _increment(
     table: _Array, c: float, s: float
 ) -> float:  # pragma: no cover  (compiled)
-    """f(c, s) - f(c, 0): nearest row of the table in c, linear interpolation in s."""
+    """f(c, s) - f(c, 0), N: row of the nearest c in the table, interpolated over s."""
     row = int(c / INCREMENT_STEPS[0] + 0.5)
     if row >= table.shape[0]:
         return 0.0
@@ -73,7 +78,11 @@ def _increment(
 def _radial_force(
     vector: _Vector, v_WP: tuple[float, float], term: float, tables: _Tables
 ) -> float:  # pragma: no cover
-    """Repulsion f(c, s), N; s is 0, |dC/dt| or the speed of approach, by ``term``."""
+    """Force f(c, s) of the law, N, away from a body at rest.
+
+    ``vector`` is that of ``_nearest``. ``term`` selects the speed s: 0, |dC/dt| or the
+    speed of approach.
+    """
     cx, cy, c, corner = vector
     vx, vy = v_WP
     f = _lookup(tables[0], c)
@@ -93,7 +102,10 @@ def _radial_force(
 def _force(
     state: _State, world: _World
 ) -> tuple[float, float, float, float, int]:  # pragma: no cover
-    """Fx, Fy, potential energy, smallest distance, and index of the nearest body."""
+    """Force Fx, Fy in W, N, potential energy, J, smallest distance, m, nearest body.
+
+    The nearest body is given by its index.
+    """
     x, y, vx, vy = state
     bodies, p_WS, gains, tables = world
     stiffness, damping, follow, _, _, every, term = gains
@@ -133,7 +145,7 @@ def forces(states: _Array, world: _World) -> _Array:  # pragma: no cover  (compi
 
 @njit(cache=True)
 def _step(state: _State, h: float, world: _World) -> _State:  # pragma: no cover
-    """State after one Runge-Kutta step, with |v| limited to the top speed."""
+    """State after one Runge-Kutta step of ``h``, s. |v| is limited to the top speed."""
     x, y, vx, vy = state
     gains = world[2]
     m, g = 1.0 / gains[3], 0.5 * h
@@ -161,10 +173,11 @@ def _step(state: _State, h: float, world: _World) -> _State:  # pragma: no cover
 def _advance(
     state: _State, h: float, world: _World
 ) -> tuple[_State, float, float]:  # pragma: no cover  (compiled)
-    """State, energy V and smallest distance after one step.
+    """State, energy V, J, and smallest distance, m, after one step of ``h`` seconds.
 
-    The force jumps where another body becomes the nearest. A step across such a jump is
-    repeated in small parts, or its error would appear as a change of the energy.
+    The force jumps where another body becomes the nearest. A step across such a jump
+    has a large error, which would look like a change of the energy. The step is
+    therefore repeated in small parts.
     """
     _, _, _, _, before = _force(state, world)
     new = _step(state, h, world)
@@ -182,9 +195,10 @@ def _advance(
 def run(
     starts: _Array, steps: int, h: float, contact: float, world: _World
 ) -> tuple[_Array, _Array, _Array]:  # pragma: no cover
-    """Integrates from each start until contact or until the last step of ``h`` seconds.
+    """Integrates from each start until contact, at most ``steps`` steps of ``h``, s.
 
-    ``starts`` are (n, 4) states as in ``forces``. Three arrays are returned:
+    ``starts`` are (n, 4) states as in ``forces``. ``contact`` is the distance from a
+    body that counts as contact, m. Three arrays are returned:
 
     - (n,) times of contact, s; infinity for a run without contact
     - (n,) smallest distances, m

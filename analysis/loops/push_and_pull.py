@@ -1,8 +1,9 @@
 """Push of an obstacle straight ahead against the pull of a target behind it.
 
 The robot drives straight toward an obstacle at rest. The law pushes the robot away from
-the obstacle, and the attraction pulls the robot toward the target. Except for
-``injected_share``, the functions of this module leave out velocity terms.
+the obstacle, and the attraction pulls the robot toward the target. The velocity term of
+a law is the part of its force that depends on the speed of the obstacle. Only
+``injected_share`` takes this part into account.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalog import LAWS
 
-#: Laws whose gains the design chooses, by name, with their tuning.
+#: Laws whose gains ``phonotaxis design`` chooses: name, and rules for the choice.
 DESIGNED_LAWS = {
     law.name: law.tuning for law in LAWS.values() if law.tuning is not None
 }
@@ -26,8 +27,8 @@ DESIGNED_LAWS = {
 #: Function from the distance of the obstacle, m, to the force away from it, N.
 Push = Callable[[float], float]
 
-#: The first number is the step between the distances at which a push is sampled, m.
-#: The second number is the largest of these distances, m.
+#: Step between the distances at which a push is sampled, and upper limit of these
+#: distances, m.
 _STEP_M, _FARTHEST_M = 0.002, 3.0
 #: Speeds at which a velocity term is sampled, as multiples of the top speed.
 _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
@@ -54,10 +55,10 @@ def net_barrier(push: Push, scenario: Scenario, meters_to_go: float) -> float:
     """Returns the largest energy that a robot loses on its way to an obstacle, J.
 
     Where the push exceeds the pull of the attraction, the robot loses kinetic energy.
-    The result is the largest loss between two points of the approach, which ends at the
-    least distance that the sensors measure. If this loss is at least the kinetic energy
-    of top speed, the robot stops, because it cannot be faster than top speed. The
-    attraction is zero at ``meters_to_go`` behind the surface of the obstacle.
+    The result is the largest loss between any two points of the approach. The approach
+    ends at the least distance that the sensors measure. If the loss is at least the
+    kinetic energy at top speed, the robot stops before the obstacle. The attraction is
+    zero at ``meters_to_go`` behind the surface of the obstacle.
     """
     c, forces = sampled_push(push, scenario)
     return largest_rise(
@@ -68,15 +69,19 @@ def net_barrier(push: Push, scenario: Scenario, meters_to_go: float) -> float:
 def sampled_push(
     push: Push, scenario: Scenario
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns (n,) distances from the least range of the sensors, m, and forces, N."""
+    """Returns (n,) ascending distances, m, and the (n,) pushes there, N.
+
+    The first distance is the least range of the sensors.
+    """
     c = np.arange(scenario.follower.ultrasonic.minimum_range_m, _FARTHEST_M, _STEP_M)
     return c, np.array([push(distance) for distance in c.tolist()])
 
 
 def largest_rise(net: NDArray[np.float64]) -> float:
-    """Returns the largest rise, J, of the potential of a force ``net``, N.
+    """Returns the largest work against a force on the way between two distances, J.
 
-    The force has one value for each distance of ``sampled_push``.
+    The way leads toward the obstacle. ``net`` has the (n,) forces away from the
+    obstacle, N, at the distances of ``sampled_push``.
     """
     potential = np.concatenate([[0.0], np.cumsum(net[1:] + net[:-1]) * _STEP_M / 2.0])
     return float(np.max(potential - np.minimum.accumulate(potential)))
@@ -85,9 +90,9 @@ def largest_rise(net: NDArray[np.float64]) -> float:
 def barrier_from_reach_n_m(scenario: Scenario, meters_to_go: float) -> float:
     """Returns the K_0, N/m, with which the conventional law stops a robot.
 
-    The law acts as a spring of stiffness K_0 within its reach rho_0. Within this reach,
-    the speed of the robot has no limit. The largest energy of the spring, K_0
-    rho_0^2/2, is equal to the sum of two energies:
+    Within its reach rho_0, the law acts as a spring of stiffness K_0. The calculation
+    ignores the speed limit of the robot within this reach. The largest energy of the
+    spring, K_0 rho_0^2/2, must equal the sum of two energies:
 
     - The kinetic energy at top speed, which the robot has at the distance rho_0.
     - The work of the attraction from the distance rho_0 to the obstacle.
@@ -101,10 +106,11 @@ def barrier_from_reach_n_m(scenario: Scenario, meters_to_go: float) -> float:
 
 
 def rest_offset(law: str, scenario: Scenario) -> float:
-    """Returns how far the leader pushes the follower off the follow point at rest, m.
+    """Returns how far the leader at rest pushes the follower off the follow point, m.
 
-    The leader is the robot that carries the source. The law of the follower treats the
-    body of the leader as an obstacle. The follower is straight behind the leader.
+    The leader is the robot that carries the source. The follow point is the point at
+    the follow distance straight behind the leader. The law of the follower treats the
+    body of the leader as an obstacle.
     """
     force = radial_law(scenario.with_robot(law=law)).function
     attraction = scenario.follower.attraction
@@ -121,7 +127,10 @@ def rest_offset(law: str, scenario: Scenario) -> float:
 
 
 def far_offset(law: str, scenario: Scenario) -> float:
-    """Returns how far an echo at the largest sensor range pushes a robot at rest, m."""
+    """Returns how far an echo at the largest sensor range displaces a robot, m.
+
+    The robot rests where the spring of the attraction balances the push of this echo.
+    """
     force = radial_law(scenario.with_robot(law=law)).function
     farthest = scenario.follower.ultrasonic.maximum_range_m
     return force(farthest, 0.0) / scenario.follower.attraction.stiffness_n_m
@@ -130,12 +139,12 @@ def far_offset(law: str, scenario: Scenario) -> float:
 def injected_share(law: str, scenario: Scenario) -> float:
     """Returns how much power the velocity term can add, relative to the damping.
 
-    The obstacle is at rest, and the robot recedes from it at the speed s. The velocity
-    term of the law adds at most the power h(s) s, with h(s) = f(c, s) - f(c, 0). Here,
-    f is the force of the law, and the distance c is half the reach rho_0 of the
-    conventional law. The damping D_r of the attraction removes the power D_r s^2. The
-    result is the largest ratio of the two powers. If the ratio is below 1, the motion
-    cannot gain energy.
+    The obstacle is at rest, and the robot recedes from it at the speed s. The force of
+    the law at the distance c is f(c, s). The velocity term is h(s) = f(c, s) - f(c, 0)
+    and adds at most the power |h(s)| s. The damping D_r of the attraction removes the
+    power D_r s^2. The result is the largest ratio of these powers for all s up to twice
+    the top speed, with c equal to half the reach rho_0 of the conventional law. If the
+    ratio is below 1, the motion cannot gain energy at this distance.
     """
     force = radial_law(scenario.with_robot(law=law)).function
     within = 0.5 * scenario.follower.laws.conventional.reach_m

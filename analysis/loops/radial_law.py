@@ -1,8 +1,9 @@
-"""Tables of the radial force f(c, s) of a law, and of the energy of f(c, 0).
+"""Tables of the radial force f(c, s) of a law, and of the work of f(c, 0).
 
-The distance of the obstacle is c, and its relative speed is s. The tables contain
-forces that the law of the controller returns. Therefore, code that evaluates thousands
-of starts does not need a second implementation of the law.
+The radial force pushes the robot away from an obstacle at the distance c that moves at
+the relative speed s. The tables are filled with values of the controller's own force
+function. Code that needs many values therefore looks them up, and does not need a
+second implementation of the law.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from diagrams.scenario.own_code import loaded_digests
 from systems.framework.input_error import InputError
 
 #: Step between the distances of ``forces_n``, m. For the default laws, linear
-#: interpolation between two entries has an error of less than 1e-5 N. For the force
-#: K_0/c near 3 cm, the error is less than 4e-4 N.
+#: interpolation between two entries has an error of less than 1e-5 N. For a force K_0/c
+#: with the distance c near 3 cm, the error is less than 4e-4 N.
 DISTANCE_STEP_M = 2e-4
-#: Steps between the distances, m, and between the speeds, m/s, of ``increments_n``.
+#: Step between the distances of ``increments_n``, m, and step between its speeds, m/s.
 INCREMENT_STEPS = (2e-3, 0.01)
 
 
@@ -33,17 +34,17 @@ INCREMENT_STEPS = (2e-3, 0.01)
 class RadialLaw:
     """The force f(c, s) of a law away from an obstacle.
 
-    The distance of the obstacle is c, m, and its relative speed that the law uses is s,
-    m/s.
+    c is the distance of the obstacle, m. s is the relative speed of the obstacle, m/s,
+    as defined by the velocity term of the scenario.
     """
 
     name: str
     function: Callable[[Any, Any], Any]
-    """The function f(c, s) of the controller, N, for floats and for AutoDiffXd."""
+    """Function f(c, s) of the controller, N. It takes floats or AutoDiffXd."""
     range_m: float
     """Largest range of the sensors, m."""
     top_speed_m_s: float
-    """Top speed of the robot, m/s. ``increments_n`` covers the speeds up to it."""
+    """Top speed of the robot, m/s, up to which ``increments_n`` has columns."""
 
     @cached_property
     def distances_m(self) -> NDArray[np.float64]:
@@ -53,7 +54,7 @@ class RadialLaw:
 
     @cached_property
     def forces_n(self) -> NDArray[np.float64]:
-        """(n,) force f(c, 0) at ``distances_m``, N; first the limit at 0."""
+        """(n,) forces f(c, 0) at ``distances_m``, N. The first is the limit at 0."""
         distances = np.maximum(self.distances_m, 1e-9).tolist()
         forces = np.array([float(self.function(c, 0.0)) for c in distances])
         if not np.all(np.isfinite(forces)):
@@ -65,7 +66,7 @@ class RadialLaw:
 
     @cached_property
     def energies_j(self) -> NDArray[np.float64]:
-        """(n,) work of the force f(c, 0) from ``distances_m`` to ``range_m``, J."""
+        """(n,) work of f(c, 0) from each of ``distances_m`` to ``range_m``, J."""
         work = 0.5 * DISTANCE_STEP_M * (self.forces_n[1:] + self.forces_n[:-1])
         return np.append(np.cumsum(work[::-1])[::-1], 0.0)
 
@@ -73,8 +74,8 @@ class RadialLaw:
     def increments_n(self) -> NDArray[np.float64]:
         """(n, k) velocity term f(c, s) - f(c, 0), N.
 
-        Row i has the distance i INCREMENT_STEPS[0]. Column j has the speed j
-        INCREMENT_STEPS[1].
+        Row i is for the distance ``i * INCREMENT_STEPS[0]``, m, and column j is for the
+        speed ``j * INCREMENT_STEPS[1]``, m/s.
         """
         dc, ds = INCREMENT_STEPS
         # The force of a law may jump, for example at rho_0. Therefore, users of the
@@ -86,7 +87,7 @@ class RadialLaw:
 
     @cached_property
     def stiffest(self) -> tuple[float, float]:
-        """Distance at which the law is stiffest, m, and its stiffness there, N/m.
+        """Distance at which the law is stiffest, m, and the stiffness there, N/m.
 
         The stiffness is the largest slope -df/dc for an obstacle at rest. It is at most
         0 if the force never grows as the obstacle comes nearer.
@@ -94,7 +95,7 @@ class RadialLaw:
         slopes = -np.diff(self.forces_n) / DISTANCE_STEP_M
         k = int(slopes.argmax())
         best = float(self.distances_m[k]), float(slopes[k])
-        # The mean slope of a step is less than the slope at its steeper end.
+        # The mean slope between two distances is at most the slope at one of them.
         inside = 1e-6 * DISTANCE_STEP_M
         for c in (self.distances_m[k] + inside, self.distances_m[k + 1] - inside):
             slope = -self.gradient(float(c), 0.0)[0]
@@ -108,19 +109,19 @@ class RadialLaw:
         return self.stiffest[1]
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """Returns f(c, s), N, positive away from the obstacle; 0 beyond the sensors."""
+        """Returns f(c, s), N, positive away from the obstacle; 0 beyond ``range_m``."""
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
     def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
-        """Interpolates ``forces_n``, N, at many distances c, m."""
+        """Returns f(c, 0) at distances c of any shape, m, from ``forces_n``, N."""
         return np.interp(np.asarray(c), self.distances_m, self.forces_n, right=0.0)
 
     def energy(self, c: ArrayLike) -> NDArray[np.float64]:
-        """Interpolates ``energies_j``, J, at many distances c, m."""
+        """Returns the work at distances c of any shape, m, from ``energies_j``, J."""
         return np.interp(np.asarray(c), self.distances_m, self.energies_j, right=0.0)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
-        """Returns the partial derivatives df/dc, N/m, and df/ds, N s/m, of ``force``.
+        """Returns the partial derivatives df/dc, N/m, and df/ds, N s/m, of f(c, s).
 
         At s = 0, the derivative by s is the one-sided derivative for s > 0.
         """
@@ -130,7 +131,11 @@ class RadialLaw:
 
 
 def radial_law(scenario: Scenario) -> RadialLaw:
-    """Returns the force of a scenario's law, up to the sensor range and top speed."""
+    """Returns the radial force of a scenario's law.
+
+    Its tables cover distances up to the sensor range and speeds up to the top speed of
+    the robot. Raises InputError if the law has no radial force.
+    """
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
     sensor = key.follower.ultrasonic
     return _radial_law(
@@ -144,7 +149,10 @@ def radial_law(scenario: Scenario) -> RadialLaw:
 
 
 class _Scenario:
-    """Carries a scenario into a cached function without being part of the key."""
+    """Passes a scenario to a cached function.
+
+    All instances are equal, so that the scenario is not a part of the cache key.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario

@@ -1,8 +1,8 @@
 """Uncertain parameters of the robot, and their effects on the poles of its loops.
 
-A function from parameter values to poles in the z plane represents the loop. The same
-code therefore serves every operating point, and does not depend on the meaning of the
-parameters.
+A loop is represented by a function from parameter values to poles in the z plane. The
+code that evaluates this function does not depend on the operating point or on the
+meaning of the parameters.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from diagrams import Scenario
 from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError
 
-#: Function from parameter values by name to poles in the z plane. Poles that are
-#: neutral at all values (the heading at rest) are left out.
+#: Function from parameter values by name to poles in the z plane. It leaves out poles
+#: that are at z = 1 for all values, such as that of the heading at rest.
 PoleFunction = Callable[[Mapping[str, float]], NDArray[np.complex128]]
 
 #: Step of the finite differences, as a share of the parameter's interval.
@@ -41,7 +41,7 @@ class UncertainParameter:
     """Parameter that is known only to lie in an interval."""
 
     name: str
-    """Field of the scenario, or another name that the pole function knows."""
+    """Name of a field of the scenario, or another name that the pole function knows."""
     symbol: str
     unit: str
     nominal: float
@@ -63,19 +63,20 @@ class UncertainParameter:
 
 @dataclass(frozen=True)
 class PoleCloud:
-    """Poles over all combinations of uncertain parameters."""
+    """Poles at random and at the worst combinations of uncertain parameters."""
 
     period_s: float
     parameters: tuple[UncertainParameter, ...]
     nominal_poles: NDArray[np.complex128]
     """Poles at the nominal values, in the z plane."""
     values: NDArray[np.float64]
-    """(samples, parameters) random values."""
+    """(samples, parameters) random values of the parameters."""
     poles: tuple[NDArray[np.complex128], ...]
     """Poles of each sample, in the z plane."""
     worst_values: dict[str, float]
-    """Values with the slowest decay, or the fastest growth, that was found."""
+    """Values of the worst case that was found: slowest decay or fastest growth."""
     worst_poles: NDArray[np.complex128]
+    """Poles in the worst case, in the z plane."""
 
     @property
     def radii(self) -> NDArray[np.float64]:
@@ -89,7 +90,7 @@ class PoleCloud:
 
     @property
     def worst_radius(self) -> float:
-        """Largest |z| that was found. If it is below 1, no unstable case was found."""
+        """Largest |z| in the worst case. Below 1, no unstable case was found."""
         return float(np.abs(self.worst_poles).max())
 
     @property
@@ -109,7 +110,7 @@ class PoleCloud:
 
     @property
     def worst_growth_per_s(self) -> float:
-        """Growth rate in the worst case, 1/s; negative if it decays."""
+        """Growth rate in the worst case, 1/s; negative if the motion decays."""
         return float(growth_per_s(self.worst_radius, self.period_s))
 
 
@@ -121,13 +122,17 @@ class PoleSensitivity:
     pole: complex
     """Slowest pole ln(z)/T at the nominal values, 1/s."""
     derivative: complex
-    """d(pole)/d(parameter), in 1/s per unit of the parameter."""
+    """Derivative of the pole by the parameter, in 1/s per unit of the parameter."""
     per_interval: complex
-    """First-order change of the pole over the whole interval, 1/s."""
+    """Derivative times the width of the parameter's interval, 1/s."""
 
 
 def slowest_pole(poles: NDArray[np.complex128], period: float) -> complex:
-    """Returns the s-plane pole, 1/s, with the largest |z|; of a pair, the upper one."""
+    """Returns the pole with the largest |z|, converted to the s plane, 1/s.
+
+    ``poles`` are in the z plane, and ``period`` is the control period, s. Of a
+    conjugate pair, the pole with the positive imaginary part is returned.
+    """
     pole = complex(s_plane(poles[[np.argmax(np.abs(poles))]], period)[0])
     return pole if pole.imag >= 0.0 else pole.conjugate()
 
@@ -142,11 +147,12 @@ def pole_cloud(
 ) -> PoleCloud:
     """Computes the poles at random parameter values and searches for the worst values.
 
-    The random values are a Latin hypercube. The search for the worst corner begins at
-    the nominal values. It moves one parameter after the other to the other end of its
-    interval, as long as this slows the decay. It finds the worst corner if each
-    parameter acts in one direction only. The worst case is the worse of this corner and
-    the worst sample. ``period`` is in s.
+    The random values are a Latin hypercube. A search for the worst corner begins at the
+    nominal values. It moves one parameter at a time to an end of its interval, and
+    keeps each move that slows the decay. The search finds the worst corner if each
+    parameter changes the decay in one direction only, whatever the values of the other
+    parameters are. The worst case is the worse of this corner and the worst sample.
+    ``period`` is the control period, s.
     """
     from scipy.stats import qmc
 
@@ -204,9 +210,10 @@ def pole_sensitivities(
     """Computes the derivatives of the slowest pole by finite differences.
 
     The differences are central, with two exceptions. If the nominal value is an end of
-    the interval, the parameter varies towards the inside only. A whole number varies
-    over its whole interval. After the variation, the pole nearest to the nominal pole
-    counts as the same pole. This is valid for simple poles. ``period`` is in s.
+    the interval, the parameter varies only towards the inside. A parameter with whole
+    numbers varies over its whole interval. After a variation, the pole nearest to the
+    nominal pole counts as the same pole. This is valid for simple poles. ``period`` is
+    the control period, s.
     """
     nominal = {p.name: p.nominal for p in parameters}
     pole = slowest_pole(poles(nominal), period)
@@ -235,7 +242,10 @@ def following_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
 
 
 def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
-    """Returns the uncertain parameters of the loop that rests against an obstacle."""
+    """Returns the uncertain parameters of the motion straight towards an obstacle.
+
+    Raises InputError if the push of the law does not grow towards the obstacle.
+    """
     stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:
         raise InputError(
@@ -263,7 +273,8 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
         ),
     )  # fmt: skip
     return (
-        # Zero means that the robot has no such spring, damper or lag.
+        # A parameter with the value zero is left out: the robot has no such spring,
+        # damper or lag.
         *(_share(*row) for row in shares if row[3] > 0.0),
         UncertainParameter(
             "wheel_radius_share", "r", "1", 1.0, 0.98, 1.02,
@@ -298,10 +309,10 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
     The name of a parameter determines its effect:
 
     - A name with a dot is a field of the scenario.
-    - ``wheel_radius_share`` acts as negative slip of the wheels, which the encoders do
-      not measure.
-    - ``sound_speed_m_s`` changes the slope of the estimated range, and so the stiffness
-      of the attraction's spring.
+    - ``wheel_radius_share`` is the true over the stated wheel radius. It acts as the
+      slip 1 - ``wheel_radius_share`` of both wheels, which the encoders do not measure.
+    - ``sound_speed_m_s`` is the true speed of sound. It multiplies the stiffness of the
+      attraction by ``range_slope``.
     - All other names are ignored here.
     """
     data = scenario.model_dump()
@@ -321,16 +332,16 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
 
 
 def range_slope(scenario: Scenario, true_speed: float) -> float:
-    """Returns the slope d(estimated range)/d(true range) for a source straight ahead.
+    """Returns the derivative of the estimated range by the true range of a source.
 
-    The slope is that at the follow distance. Let l be half the length of the microphone
-    row, R the range, h^2 = R^2 + l^2, and k the believed over the true speed of sound.
-    From the measured delay the estimator computes the range
+    The source is straight ahead at the follow distance. Let l be half the length of the
+    row of microphones, R the true range, h^2 = R^2 + l^2, and k the ratio of the speed
+    of sound that the estimator assumes to ``true_speed``, m/s. From the measured delay,
+    the estimator computes the range
 
         l^2/(2 k (h - R)) - k (h - R)/2.
 
-    The slope of this range is ((h + R)/k + k (h - R))/(2 h). It is 1 if the believed
-    speed is ``true_speed``, m/s.
+    Its derivative by R is ((h + R)/k + k (h - R))/(2 h), which is 1 for k = 1.
     """
     k = scenario.believed_sound_speed_m_s / true_speed
     half = max(abs(y) for _, y in scenario.only.robot.microphones_m)
@@ -340,7 +351,10 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
 
 
 def contact_poles(scenario: Scenario) -> PoleFunction:
-    """Returns a function for the z-plane poles of the contact mode at its stiffest."""
+    """Returns a function for the z-plane poles of the motion towards an obstacle.
+
+    The robot is at the distance from the obstacle at which the law is stiffest.
+    """
 
     def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:
         changed = with_values(scenario, values)
@@ -357,9 +371,10 @@ def following_poles(at: OperatingPoint) -> PoleFunction:
     """Returns a function for the z-plane poles of the motion about an equilibrium.
 
     The equilibrium moves with the parameters. Neutral poles (z = 1) are left out. The
-    latency of hearing is not a parameter here. Odometry assigns each measurement to the
-    pose at which the sound was heard. A latency therefore delays the source's motion,
-    but not the motion of the loop.
+    latency of hearing is not a parameter. The tracker combines each measurement with
+    the pose, from odometry, at which the robot heard the sound. A latency therefore
+    delays the response to motion of the source, but not the feedback of the robot's own
+    motion.
     """
 
     def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:

@@ -1,4 +1,4 @@
-"""Comparison of linear prediction and simulation: frequency and damping of a step."""
+"""Frequency and damping of a step response: linear prediction against simulation."""
 
 from __future__ import annotations
 
@@ -23,37 +23,49 @@ class Oscillation:
     """Damped oscillation."""
 
     frequency_rad_s: float
+    """Natural frequency, rad/s."""
     damping_ratio: float
 
 
 @dataclass(frozen=True)
 class StepCheck:
-    """Response to a step along the line to the source: predicted and simulated."""
+    """Response to a start beside the equilibrium: predicted and simulated.
+
+    The start is on the line from the equilibrium to the source.
+    """
 
     predicted: Oscillation
-    """By the sampled linear model."""
+    """Oscillation that the sampled linear model predicts."""
     ideal: Oscillation
-    """Fitted to the simulation with exact sensors."""
+    """Oscillation fitted to the simulation with exact sensors."""
     full: Oscillation | None
-    """Fitted to the simulation with the scenario's sensors."""
+    """Oscillation fitted to the simulation with the scenario's own sensors. None if
+    this simulation was not requested."""
     step_m: float
+    """Distance of the start from the equilibrium towards the source, m."""
     time_s: NDArray[np.float64] = field(repr=False)
-    """(n,)"""
+    """(n,) times, s."""
     predicted_m: NDArray[np.float64] = field(repr=False)
     """(n,) distance of P from the source, by the linear model, m."""
     ideal_m: NDArray[np.float64] = field(repr=False)
     """(n,) distance of P from the source, with exact sensors, m."""
     full_m: NDArray[np.float64] | None = field(repr=False)
-    """(n,) distance of P from the source, with the scenario's sensors, m."""
+    """(n,) distance of P from the source, with the scenario's own sensors, m."""
 
     @property
     def frequency_error(self) -> float:
-        """Relative error of the predicted frequency, compared to exact sensors."""
+        """Relative error of the predicted frequency.
+
+        The reference is the simulation with exact sensors.
+        """
         return self.predicted.frequency_rad_s / self.ideal.frequency_rad_s - 1.0
 
     @property
     def damping_error(self) -> float:
-        """Relative error of the predicted damping ratio, compared to exact sensors."""
+        """Relative error of the predicted damping ratio.
+
+        The reference is the simulation with exact sensors.
+        """
         return self.predicted.damping_ratio / self.ideal.damping_ratio - 1.0
 
 
@@ -67,9 +79,9 @@ def check_step(
     """Simulates a start near the equilibrium and compares it with the linear model.
 
     The start is ``step_m`` from the equilibrium towards the source. Bodies rest where
-    they are at 0 s. ``full`` also simulates the scenario's own sensors. Raises
-    InputError if there is no stable equilibrium, or its linear model does not
-    oscillate.
+    they are at 0 s. If ``full`` is true, the scenario is also simulated with its own
+    sensors. Raises InputError if there is no stable equilibrium, or if the linear model
+    does not oscillate.
     """
     point = follow_equilibrium(scenario)
     modes = [mode for mode in point.modes if mode.eigenvalue.imag > 1e-6]
@@ -79,7 +91,7 @@ def check_step(
             "nothing oscillates about the equilibrium, so that there is no frequency "
             "to compare; use a larger stiffness_n_m for this damping_n_s_m",
         )
-    # Along the line to the source, the oscillation has the highest frequency.
+    # The mode with the highest frequency is that along the line to the source.
     along = max(modes, key=lambda mode: mode.frequency_rad_s)
     ideal = _run(point.loop.scenario, point, step_m, duration_s)
     own = None
@@ -100,7 +112,7 @@ def check_step(
 def _predicted(
     point: OperatingPoint, step_m: float, time_s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(n,) distance of P from the source, from the one-period matrix, m."""
+    """(n,) distances of P from the source that the linear model predicts, m."""
     loop = point.loop
     A = loop.period_derivatives(point.state, point.time_s).A
     ahead = point.axes[0]
@@ -119,12 +131,16 @@ def _predicted(
 def _run(
     scenario: Scenario, point: OperatingPoint, step_m: float, duration_s: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times, s, and distances of P from the source, m, after a start near the point."""
+    """Simulated times, s, and distances of P from the source, m.
+
+    The start is ``step_m`` from the equilibrium ``point`` towards the source.
+    """
     ahead = np.array([math.cos(point.theta_WB), math.sin(point.theta_WB)])
     epsilon = scenario.only.robot.control_point_m
     x, y = control_point((*(point.p_WP + step_m * ahead), point.theta_WB), -epsilon)
     start = {"position_m": [x, y], "heading_deg": math.degrees(point.theta_WB)}
-    # No stop rules: the robot is so slow after a small step that it counts as at rest.
+    # The stop rules are left out. After a small step, the robot is so slow that they
+    # would take it to be at rest and end the run.
     follower = build_sound_follower(changed(scenario, {"start": start}), log=True)
     simulator = make_simulator(follower)
     simulator.Initialize()
@@ -145,16 +161,16 @@ def fitted_step(
 ) -> Oscillation:
     """Fits a damped oscillation about a constant by least squares.
 
-    The fit also has a bias and a second harmonic that decay with the oscillation. The
-    repulsion depends on the norm of a velocity. This norm causes a bias and a second
-    harmonic, but no damping. The first two seconds are left out. ``guess_rad_s`` is an
-    initial guess of the frequency.
+    ``time_s`` and ``distance_m`` are (n,). The first two seconds are left out.
+    ``guess_rad_s`` is an initial guess of the frequency. Besides the oscillation, the
+    fit has a bias and a second harmonic, which decay at the same rate. They occur
+    because the push depends on the norm of a velocity. This norm adds no damping.
     """
     later = time_s >= 2.0
     t, x = time_s[later] - 2.0, distance_m[later]
 
     def waves(rate: float, omega: float) -> NDArray[np.float64]:
-        """(n, 6) constant, bias, fundamental and second harmonic."""
+        """(n, 6) columns: constant, bias, fundamental (2), and second harmonic (2)."""
         fade = np.exp(-rate * t)
         harmonics = [f(k * omega * t) * fade for k in (1, 2) for f in (np.cos, np.sin)]
         return np.column_stack([np.ones_like(t), fade, *harmonics])

@@ -18,10 +18,10 @@ from analysis.report.palette import text_color
 
 _POINTS_PER_INCH = 72.0
 #: _GAPS_PT: possible gaps between a body and its label, pt.
-#: _LEAD_FROM_PT: least gap at which a line connects the two, pt.
+#: _LEAD_FROM_PT: least gap at which a line connects the label with the body, pt.
 _GAPS_PT, _LEAD_FROM_PT = (2.0, 8.0, 15.0, 24.0, 34.0, 46.0), 8.0
-#: Number of possible directions from a body to its label. The first direction is to
-#: the right of the body's x axis, which is the preferred side.
+#: Number of possible directions from a body to its label. The preferred direction is
+#: to the right, as seen along the body's x axis.
 _DIRECTIONS = 16
 #: Margin around a label, pt.
 _MARGIN_PT = 1.0
@@ -41,8 +41,9 @@ class BodyLabel(Annotation):
     def __init__(self, text: str, rectangle: ArrayLike, color: str) -> None:
         """Places the label at the right side of the body.
 
-        The body is (x, y, theta, length, width) in the world frame W, m and rad. The
-        text gets the color of the body, darkened if needed.
+        The argument ``rectangle`` is the outline of the body: (x, y, theta, length,
+        width) in the world frame W, m and rad. The text gets the color of the body,
+        darkened if needed.
         """
         x, y, theta, length, width = map(float, np.asarray(rectangle))
         unit = math.sin(theta), -math.cos(theta)
@@ -73,7 +74,7 @@ def spread_labels(axes: Axes) -> None:
 
     The drawing must be complete, and the limits of the axes final. A label covers
     another label only if there is no other place. If a label is 8 points or more away
-    from its body, a thin line connects the two.
+    from its body, a thin line connects them.
     """
     figure = axes.get_figure(root=True)
     assert figure is not None
@@ -180,7 +181,7 @@ def _ink(axes: Axes, scale: float) -> NDArray[np.float64]:
 
 
 def _dots(points: NDArray[np.float64], *, drawn: bool) -> NDArray[np.float64]:
-    """Points every 1 pt along a line; without a line, the given points."""
+    """Points every 1 pt along a line through points. If not ``drawn``, these points."""
     points = points[np.isfinite(points).all(axis=1)]
     if not drawn or len(points) < 2:
         return points

@@ -1,4 +1,4 @@
-"""Criteria and verdicts on numbers: pass, fail, or not applicable, with a text."""
+"""Criteria for numbers, and the verdicts: pass, fail, or not applicable."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ YES_OR_NO = "yes or no"
 
 Judgement = Literal["pass", "fail", "not applicable"]
 
-#: A number, or a text with the reason why the number does not exist.
+#: A number, or a clause that states why there is no number.
 Reading = float | str
 
 Data = TypeVar("Data")
@@ -20,21 +20,24 @@ Data = TypeVar("Data")
 
 @dataclass(frozen=True)
 class Criterion(Generic[Data]):
-    """A criterion compares a number in the data of a section with a threshold."""
+    """A comparison of a number with a threshold.
+
+    The number comes from ``Data``, the data of a section of a report.
+    """
 
     name: str
     unit: str
     sense: Literal["at least", "above", "at most", "below"]
     limit: float
     good: str
-    """What follows if the number meets the threshold; a clause."""
+    """Clause that states what follows if the number meets the threshold."""
     bad: str
-    """What follows if the number does not meet the threshold; a clause."""
+    """Clause that states what follows if the number does not meet the threshold."""
     source: str
     """Where the threshold comes from."""
     read: Callable[[Data], Reading]
-    """Takes the number from the data of the section. NaN means that there is no such
-    number."""
+    """Takes the number from the data of the section. If there is no such number, the
+    result is NaN, or a clause with the reason."""
 
     @property
     def threshold(self) -> str:
@@ -66,7 +69,7 @@ class Criterion(Generic[Data]):
         )
 
     def without_number(self, reason: str) -> Verdict:
-        """Returns the verdict if there is no number, for a reason (a clause)."""
+        """Returns the verdict ``not applicable``; ``reason`` is its text, a clause."""
         return self._verdict(None, "not applicable", reason)
 
     def _verdict(self, value: float | None, verdict: Judgement, text: str) -> Verdict:
@@ -86,14 +89,14 @@ class Verdict:
     threshold: str
     verdict: Judgement
     text: str
-    """The verdict in plain words."""
+    """Clause that states what follows, or why there is no number."""
     source: str
     """Where the threshold comes from."""
 
 
 @dataclass(frozen=True)
 class VerdictRow:
-    """The verdicts of all laws on one criterion."""
+    """The verdicts on several laws by one criterion."""
 
     name: str
     unit: str
@@ -101,18 +104,22 @@ class VerdictRow:
     values: dict[str, float | None]
     verdicts: dict[str, Judgement]
     text: str
-    """The verdicts in plain words. Laws with the same text share one sentence."""
+    """Texts of the verdicts. Laws with the same text share one sentence."""
 
 
 def shown_value(value: float | None, unit: str) -> float | str | None:
-    """Returns the value of a verdict as a table shows it: "yes", "no", or the value."""
+    """Returns the value that a table shows: "yes" or "no" for a yes-or-no number."""
     if value is None or unit != YES_OR_NO:
         return value
     return "yes" if value else "no"
 
 
 def compare_verdicts(by_law: Mapping[str, Sequence[Verdict]]) -> tuple[VerdictRow, ...]:
-    """Puts the verdicts of several laws side by side, in the order of the first law."""
+    """Makes one row per criterion, with the verdicts on several laws side by side.
+
+    The rows have the order of the verdicts on the first law. The verdicts on all laws
+    must be by the same criteria.
+    """
     laws = list(by_law)
     rows = []
     for first in by_law[laws[0]]:

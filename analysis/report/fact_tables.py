@@ -48,10 +48,11 @@ def fact_table(
 ) -> Table:
     """Makes a table with two columns: the name and the value of each fact.
 
-    If a value is a mapping, its entries get a row each. Their names start with the name
-    of the mapping. The table omits lists of mappings and lists of more than 8 values,
-    and also the keys and dotted paths in ``skip``. ``facts`` are plain values (see
-    ``analysis.report.plain_values``).
+    The values in ``facts`` are plain values (see ``analysis.report.plain_values``). If
+    a value is a mapping, each of its entries has a row. The name in this row begins
+    with the name of the mapping. The table omits lists of mappings, lists of lists, and
+    lists of more than 8 values. It also omits the facts in ``skip``, which are given by
+    key or by dotted path.
     """
     rows = list(_facts(facts, "", "", frozenset(skip)))
     return Table(["", ""], rows, caption)

@@ -22,10 +22,11 @@ def distinct_names(
 ) -> list[str]:
     """Makes a different file name for each text, as close to the text as possible.
 
-    Names may neither equal each other nor ``taken``, with any of the ``endings``. If a
-    name is taken, the new name is, for example, ``summary-2``, with ``joint`` before
-    the number. Two names that differ only in upper and lower case count as equal, as in
-    the file systems of macOS and Windows.
+    The caller can append each of the ``endings`` to each name. If a file name that
+    results is in ``taken``, or belongs to an earlier text, the function appends
+    ``joint`` and a number to the name, for example ``summary-2``. File names that
+    differ only in upper and lower case count as equal, as in the file systems of macOS
+    and Windows.
 
     Hyphens replace characters that some file systems reserve. Dots and spaces at both
     ends are removed. A name has at most 200 bytes, not counting its number.

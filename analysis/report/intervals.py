@@ -34,9 +34,9 @@ class Estimate:
     def text(self, form: str, *, unit: str = "", factor: float = 1.0) -> str:
         """Writes the value and its interval in the form '12.5 % (3.1, 22.0)'.
 
-        All three numbers are multiplied by ``factor`` and formatted by ``form``; zeros
-        never have a minus sign. The unit begins with a space. Without samples, the text
-        is a dash.
+        All three numbers are multiplied by ``factor`` and formatted by ``form``. Zeros
+        never have a minus sign. The text ``unit`` follows the value without a space in
+        between. If there are no samples, the result is a dash.
         """
         if self.n == 0:
             return "-"
@@ -46,12 +46,12 @@ class Estimate:
 
 
 def nothing(level: float = LEVEL) -> Estimate:
-    """The estimate without any sample."""
+    """Returns the estimate from no samples, whose numbers are NaN."""
     return Estimate(math.nan, math.nan, math.nan, 0, level)
 
 
 def estimate_rate(count: int, n: int, *, level: float = LEVEL) -> Estimate:
-    """Estimates the probability of an event that ``count`` of ``n`` samples have.
+    """Estimates the probability of an event that ``count`` of ``n`` samples show.
 
     The interval is Wilson's score interval, without continuity correction. Reference:
     Wilson (1927).
@@ -77,7 +77,7 @@ def estimate_mean(
     if not len(samples):
         return nothing(level)
     found = bootstrap(
-        # scipy rejects a single sample. Two equal samples have the same interval.
+        # scipy rejects a single sample. If it occurs twice, the interval has width 0.
         (np.resize(samples, max(len(samples), 2)),),
         np.mean,
         n_resamples=resamples,
@@ -92,11 +92,11 @@ def estimate_mean(
 def estimate_median(values: ArrayLike, *, level: float = LEVEL) -> Estimate:
     """Estimates a median, with a confidence interval from order statistics.
 
-    The samples are independent. The interval is valid for any distribution of the
-    samples. The number of samples below the true median has a binomial distribution.
-    This distribution determines which two of the sorted samples bound the interval. At
-    a level of 95 %, this needs at least six samples. With fewer samples, the interval
-    extends from the least to the greatest sample.
+    The samples must be independent. They may have any distribution. The number of
+    samples below the true median has a binomial distribution. This distribution
+    determines which two of the sorted samples are the ends of the interval. At a level
+    of 95 %, at least six samples are needed. With fewer samples, the interval extends
+    from the least to the greatest sample, and its true level is lower.
     """
     # scipy's quantile_test gives the same interval, but takes 15 times as long.
     from scipy.stats import binom

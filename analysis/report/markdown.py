@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 
 def markdown_row(cells: Iterable[object]) -> str:
-    """Makes one row of a table."""
+    """Makes one row of a table from its cells."""
     return f"| {' | '.join(str(cell) for cell in cells)} |"
 
 

@@ -13,9 +13,9 @@ _DPI = 100
 class NotebookFigure(Figure):
     """A matplotlib figure that a notebook shows as the last value of a cell.
 
-    Notebooks show figures of pyplot in the same way. But pyplot keeps all figures in
-    memory and chooses a window system. A figure of this class can be deleted like any
-    other object.
+    Notebooks also show figures of pyplot in this way. But pyplot keeps all figures in
+    memory, and loads a window system. Figures of this class need no window system, and
+    are freed like any other object.
     """
 
     def _repr_png_(self) -> bytes:

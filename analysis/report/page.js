@@ -1,4 +1,4 @@
-/* The Tab key reaches the elements that can be scrolled, and no others. */
+/* Lets the Tab key reach exactly those elements that can be scrolled. */
 const reach = () => document.querySelectorAll(".wide, .drawing, .equation").forEach(
   (box) => box.scrollWidth > box.clientWidth
     ? box.setAttribute("tabindex", 0) : box.removeAttribute("tabindex"));

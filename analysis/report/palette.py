@@ -1,4 +1,4 @@
-"""Colors that have the same meaning in every picture, and the grid of pictures."""
+"""Colors that have the same meaning in every picture, and a faint grid."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Color of each kind of thing, after the palette of Okabe and Ito. People with any kind
+#: Color of each kind of thing, from the palette of Okabe and Ito. People with any kind
 #: of color vision can distinguish these colors. Light colors of the palette are
 #: darkened, so that lines have a contrast of 3 to 1 on white (WCAG 2.2, 1.4.11).
-#: Orange became brown, because people who see no green would confuse a darker orange
-#: with vermilion. "sound" is light, because it is drawn below other things.
+#: Brown replaces orange, because people who cannot see green would confuse a darker
+#: orange with vermilion. "sound" is light, because other things are drawn over it.
 COLORS = {
     "robot": "#0072B2",
     "source": "#D55E00",
@@ -48,8 +48,9 @@ ROBOT_COLORS = (
     "#444444",
 )
 
-#: Colors of curves that belong to none of these things, for example to laws, in order.
-#: The first one is gray, for driving without a law of avoidance.
+#: Colors of curves that belong to none of the things in ``COLORS``, for example the
+#: curves of several laws, in order. The first color is gray, for driving without
+#: avoidance.
 SERIES_COLORS = (
     COLORS["empty"],
     "#D55E00",

@@ -17,7 +17,9 @@ from pydantic import BaseModel
 def plain(value: Any) -> Any:
     """Converts a value to mappings, lists, texts, numbers, truth values and None.
 
-    These types need a conversion; any other type raises TypeError:
+    The entries of mappings, lists and tuples are converted, too. The function converts
+    values of the types below. It raises TypeError for any other type that JSON cannot
+    represent.
 
     - An object with a method ``to_dict`` is replaced by the result of this method.
     - Any other dataclass becomes a mapping of its fields. Fields whose names begin with
@@ -59,7 +61,7 @@ def _leaf(value: Any) -> Any:
 
 
 def pick(value: Any, *names: str) -> dict[str, Any]:
-    """Returns some attributes of an object by name."""
+    """Returns the attributes with these names, by name."""
     return {name: getattr(value, name) for name in names}
 
 

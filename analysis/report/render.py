@@ -53,16 +53,16 @@ _COLORS = {
     "not applicable": "none",
     "not computed": "none",
 }
-#: Width of the text in a terminal.
+#: Width of the text in a terminal, in characters.
 _COLUMNS = 88
 
 
 def html(content: Content, name: str = "", level: int = 2) -> Markup:
     """Returns a paragraph, table, figure, section or other content as HTML.
 
-    ``name`` is the anchor of a section, whose heading has a ``level`` from 1 to 4. For
-    a figure or a formula, ``name`` is the beginning of all identifiers in its SVG. Each
-    of these names may occur once on a page.
+    If the content is a section, ``name`` is its anchor, and ``level`` is the level of
+    its heading, 1 to 4. If the content is a figure or a formula, all identifiers in its
+    SVG begin with ``name``. Each name must be unique on the page.
     """
     return Markup(_template().show(content, name, level))
 
@@ -75,14 +75,15 @@ def heading(text: str) -> Markup:
 def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) -> str:
     """Returns a whole HTML document with an embedded style sheet.
 
-    The contents are pairs of anchor and title, one pair for each of the sections, which
-    ``parts`` contains as HTML. The page loads no other files, apart from its pictures.
+    The argument ``parts`` contains the sections as HTML, and ``contents`` contains the
+    anchor and the title of each section. The page loads no other files, apart from its
+    pictures.
     """
     return f"{_template().page(title, list(contents), list(map(Markup, parts)))}\n"
 
 
 def text(content: Content) -> str:
-    """Returns content as plain text for a terminal; figures have only a caption."""
+    """Returns content as plain text for a terminal; of a figure, only the caption."""
     match content:
         case Section():
             title = f"{content.title}\n{'-' * len(content.title)}"
@@ -128,7 +129,7 @@ def _table_text(table: Table) -> str:
 
 
 def _column_text(head: Column, cells: Sequence[Cell]) -> list[str]:
-    """Returns a heading and cells of equal width: texts at the left, numbers right."""
+    """Returns a heading and cells of equal width, aligned left if a cell is a text."""
     words = [head.heading, *(_cell_text(cell, head.digits) for cell in cells)]
     width = max(map(len, words))
     left = any(isinstance(cell, str) and cell != ZERO for cell in cells)
@@ -178,8 +179,8 @@ def _inline(line: str) -> Markup:
 def figure_svg(figure: Drawing, name: str, label: str) -> Markup:
     """Returns a figure as an SVG element; the same figure always gives the same HTML.
 
-    All identifiers in the SVG begin with the name, so each drawing of a page needs a
-    different one: letters, digits, hyphens and underscores. The label is for screen
+    All identifiers in the SVG begin with ``name``, which must be unique on the page. A
+    name consists of letters, digits, hyphens and underscores. The label is for screen
     readers.
     """
     stream = io.StringIO()

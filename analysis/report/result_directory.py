@@ -24,9 +24,9 @@ class ResultDirectory:
     def __init__(self, path: Path, made: list[Path]) -> None:
         """Locks an existing directory.
 
-        The list ``made`` contains the new directories among the path and its parents,
-        innermost first; ``undo`` removes them. Raises InputError if another process has
-        locked the directory, or if the directory is no longer empty.
+        The list ``made`` contains those of the directory and its parents that this
+        process has created, innermost first. ``undo`` removes them. Raises InputError
+        if another process has locked the directory, or if it is no longer empty.
         """
         self.path = path
         self._made = made
@@ -68,8 +68,9 @@ class ResultDirectory:
 def take_directory(out: str | Path | None) -> ResultDirectory:
     """Creates and locks the result directory before any computation starts.
 
-    None means the next number under ``results``. The directory exists then, is empty,
-    and belongs to this process. For errors, see ``check_directory``.
+    If ``out`` is None, the directory is the next number under ``results``. After the
+    call, the directory exists, is empty, and belongs to this process. For the errors,
+    see ``check_directory``.
     """
     if out is not None:
         path = check_directory(out)
@@ -79,12 +80,13 @@ def take_directory(out: str | Path | None) -> ResultDirectory:
 
 @contextmanager
 def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
-    """Yields the result directory as the user knows it, and a hidden one to write to.
+    """Yields the path of the result directory for messages, and a hidden directory.
 
-    At the end of the ``with`` block, the hidden directory replaces the result
-    directory. If the block raises an exception, including KeyboardInterrupt, all new
-    directories are removed. This also applies to parent directories that were created.
-    For ``out``, see ``take_directory``.
+    The caller writes all files into the hidden directory. At the end of the ``with``
+    block, the hidden directory replaces the result directory. If the block raises an
+    exception, including KeyboardInterrupt, all new directories are removed. This also
+    applies to parent directories that were created. For ``out``, see
+    ``take_directory``.
     """
     taken = take_directory(out)
     path, partial = taken.path, None
@@ -131,8 +133,9 @@ def numbered_results() -> list[Path]:
 def check_directory(out: str | Path, *, parent: bool = False) -> Path:
     """Checks that a new directory can be created, and resolves its path.
 
-    If ``out`` is only the parent of the new directory, it may contain files. Raises
-    InputError if the directory is in use, or cannot be created or written.
+    If ``parent`` is true, ``out`` is the parent of the new directory and may contain
+    files. Raises InputError if the directory is not empty, or cannot be created or
+    written.
     """
     shown = shortened(str(out), 80)
     try:
@@ -177,7 +180,7 @@ def _make(path: Path) -> list[Path]:
 
 
 def _make_number(base: Path) -> tuple[Path, list[Path]]:
-    """Creates the directory of the next number that no other process has taken."""
+    """Creates the directory with the next free number; also returns new parents."""
     made = _make(base)
     numbers = [int(p.name) for p in base.glob("[0-9]*") if p.name.isdecimal()]
     number = max(numbers, default=0)

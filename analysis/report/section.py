@@ -1,7 +1,7 @@
 """The contents of a report as data: sections with texts, tables, and figures.
 
-``analysis.report.render`` writes them as HTML and as text for a terminal. A text may
-mark code by backquotes; every other character stands for itself.
+``analysis.report.render`` writes these contents as HTML, or as text for a terminal. In
+all texts, backquotes enclose code. Other characters have no special meaning.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ class Table:
     """A table of texts and numbers."""
 
     columns: Sequence[Column | str]
-    """A text means a column without unit. If no column has a name, the table has no row
-    of headings."""
+    """A text is the name of a column without a unit. If all names are empty, the table
+    has no row of headings."""
     rows: Iterable[Sequence[Cell]]
     """Cells of each row. A row with a single cell spans the table and is a heading for
     the rows below."""
@@ -89,8 +89,9 @@ class Table:
     ) -> Table:
         """Makes a table with one row per object.
 
-        Each column has the name of an attribute, which may be a dotted path, or a
-        function that takes the object and returns the cell.
+        The mapping ``columns`` states where the cells of each column come from: either
+        the name or the dotted path of an attribute of the object, or a function that
+        takes the object and returns the cell.
         """
         cells = [attrgetter(x) if isinstance(x, str) else x for x in columns.values()]
         rows = [[cell(each) for cell in cells] for each in objects]
@@ -171,7 +172,7 @@ class Section:
     """A section of a report."""
 
     key: str
-    """Name of the section in the JSON document and in links."""
+    """Key of the section in the JSON document, and its anchor in links."""
     title: str
     contents: Sequence[Content] = ()
     """Paragraphs, tables, figures and sections, in the order in which they are read."""
@@ -179,8 +180,6 @@ class Section:
     """Entry of the JSON document; ``plain`` must be able to convert it."""
     verdicts: Sequence[Verdict] = ()
     """Verdicts on the numbers of the section."""
-    fresh: bool = False
-    """Whether the section begins on a new sheet when the page is printed."""
 
 
 #: What a section contains. A text is a paragraph; ``Markup`` is HTML.

@@ -1,7 +1,9 @@
-"""Analyzes whether the adaptive gains of a law stay bounded.
+"""Analyzes whether the gains of a law that adapts them stay bounded.
 
-The analysis covers a Lyapunov function, the drift under a constant push, a robot that
-is jammed at a wall, and the critical adaptation rate.
+The gains are the stiffness K and the damping D between the control point P and a target
+that moves along the route. The analysis covers a Lyapunov function, the drift of K
+under a constant push, a robot that a wall holds (a jam), and the critical adaptation
+rate.
 """
 
 from __future__ import annotations
@@ -23,14 +25,17 @@ from systems.laws.trajectory.sampled_bounds import pull_through_m
 from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 from systems.laws.trajectory.trajectory_impedance import target_force
 
-# Length of a run with the Lyapunov function, and of a run for the critical rate, s.
+# Durations of a run with the Lyapunov function and of a run for the critical rate, s.
 _LEARN_S, _CRITICAL_S = 60.0, 60.0
-# Initial gains over desired gains in a run with the Lyapunov function.
+# Initial gains divided by desired gains in a run with the Lyapunov function.
 _OFF = 0.5
-# The adaptation runs away if a gain, or a motion in m or m/s, exceeds this.
+# The adaptation counts as running away if a gain (N/m or N s/m), a position (m) or a
+# velocity (m/s) exceeds this value.
 _WILD = 1e4
-# Adaptation rates to try for an amplitude of 1 m, ten per decade, (N/m)^2/(m^2 s).
+# Adaptation rates to try for an amplitude of 1 m, ten per decade, in the unit of
+# ``AdaptationStability.rate``.
 _RATES = np.geomspace(1.0, 1e6, 61)
+# Number of bisections in the search for the critical rate.
 _HALVINGS = 8
 # Largest rate that the parameters of the law allow.
 _LARGEST_RATE = 1e6
@@ -38,8 +43,8 @@ _LARGEST_RATE = 1e6
 _AMPLITUDES_M = (0.3, 1.0, 3.0)
 # Times at which the drift is listed, s.
 _DRIFT_S = (60.0, 600.0, 6000.0)
-# The jam, in this order: duration, s; time simulated afterward, s; target speed, m/s;
-# x of the wall, m; largest x of control point P, m.
+# The jam. Duration, s; simulated time after it, s; speed of the target, m/s; x of the
+# wall, m; largest x that the control point P can reach, m.
 _JAM_S, _AFTER_S, _JAM_SPEED_M_S, _WALL_M, _HELD_M = 90.0, 60.0, 0.15, 1.6, 1.0
 # Coordinates of a wall that is absent, m.
 _GONE_M = 1e9
@@ -51,7 +56,10 @@ _DRAWN = 600
 
 @dataclass(frozen=True)
 class LyapunovRun:
-    """Lyapunov function V in a run without contacts from half the desired gains."""
+    """Lyapunov function V over time in a run without contacts.
+
+    The run begins with half of the desired gains.
+    """
 
     time_s: NDArray[np.float64]
     """(n,) time, s."""
@@ -64,9 +72,9 @@ class LyapunovRun:
     wanted: tuple[float, float]
     """Desired gains: K = M w_n^2, N/m, and D = 2 xi w_n M, N s/m."""
     largest_rise: float
-    """Largest rise of the continuous V between samples, as a share of V(0)."""
+    """Largest rise of the continuous V over one control period, as a share of V(0)."""
     sampled_rise: float
-    """Largest rise of the sampled V in a control period, as a share of V(0)."""
+    """Largest rise of the sampled V over one control period, as a share of V(0)."""
 
     @property
     def falls(self) -> bool:
@@ -83,43 +91,53 @@ class Drift:
     time_s: tuple[float, ...]
     """Times at which K is listed, s."""
     gradient_n_m: tuple[float, ...]
-    """K of the gradient rule without limits: (K_0^4 + 4 gamma F^2 t)^(1/4), N/m."""
+    """K by the closed form for the gradient rule without limits, N/m: see
+    ``drift_stiffness``."""
     simulated_n_m: tuple[float, ...]
-    """Simulated K of the scenario's rule without limits, N/m."""
+    """K in a simulation of the scenario's rule without limits of the gains, N/m."""
     limited_n_m: tuple[float, ...]
-    """Simulated K of the scenario's rule, N/m."""
+    """K in a simulation of the scenario's rule with its own limits, if any, N/m."""
     curve_s: NDArray[np.float64]
     """(n,) times of the curves, s."""
     curves_n_m: NDArray[np.float64]
-    """(n, 2) K without limits, and limited K, N/m."""
+    """(n, 2) curves of the two simulations: without limits, and as in the scenario,
+    N/m."""
 
 
 @dataclass(frozen=True)
 class Jam:
-    """Stiffness K while a wall blocks the robot, and after the wall is removed."""
+    """Stiffness K while a wall holds the robot (a jam), and after the wall is removed.
+
+    Each pair has the result without limits of the gains, and then the result with the
+    limits of the scenario. A stiffness that has diverged is infinite.
+    """
 
     jam_s: float
     """Duration of the jam, s."""
     after_s: float
     """Simulated time after the jam, s."""
     end_n_m: tuple[float, float]
-    """K at the end of the jam without limits, and with those of the scenario, N/m."""
+    """K at the end of the jam, N/m."""
     left_n_m: tuple[float, float]
-    """Stiffness K at the end of the run, in the same order; infinite if K diverged."""
+    """K at the end of the run, N/m."""
 
 
 @dataclass(frozen=True)
 class CriticalRate:
-    """The adaptation rate from which K and D run away, without limits and contacts."""
+    """The least adaptation rate gamma_crit at which the gains or the motion diverge.
+
+    The gains have no limits, and there are no contacts.
+    """
 
     amplitude_m: float
-    """Amplitude a of the target a (sin 0.6 t + 0.5 sin 1.7 t), m."""
+    """Amplitude a of the target's position a (sin 0.6 t + 0.5 sin 1.7 t), m."""
     rate: float
-    """gamma_crit, (N/m)^2/(m^2 s); infinite if no allowed rate is critical."""
+    """gamma_crit, in the unit of ``AdaptationStability.rate``. Infinite if no allowed
+    rate is critical."""
 
     @property
     def product(self) -> float:
-        """gamma_crit a^2, which does not depend on a."""
+        """gamma_crit a^2. In theory, this product does not depend on a."""
         return self.rate * self.amplitude_m**2
 
 
@@ -130,11 +148,12 @@ class AdaptationStability:
     rule: str
     """Name of the rule."""
     rate: float
-    """Adaptation rate gamma, (N/m)^2/(m^2 s)."""
+    """Adaptation rate gamma. Its unit is (N/m)^2 s^2/m^2 for the rule ``lyapunov``, and
+    (N/m)^2/(m^2 s) for the rule ``sensitivity``."""
     reference: tuple[float, float]
     """Natural frequency w_n, rad/s, and damping ratio xi of the reference model."""
     reference_poles: NDArray[np.complex128]
-    """(2,) poles of the reference model in the s plane, rad/s."""
+    """(2,) poles of the continuous reference model in the s plane, rad/s."""
     held_poles: NDArray[np.complex128]
     """(2,) poles of the discrete reference model in the z plane."""
     lyapunov: LyapunovRun | None
@@ -142,20 +161,22 @@ class AdaptationStability:
     drift: Drift
     jam: Jam
     critical: CriticalRate
-    """Critical rate for a target with the amplitude of ``pull_through_m``."""
+    """Critical rate for the amplitude ``pull_through_m``. If the target leads P by this
+    distance, it pulls P through a contact."""
     products: tuple[CriticalRate, ...]
-    """Critical rates for the other amplitudes."""
+    """Critical rates for the amplitudes 0.3 m, 1 m and 3 m, to compare their
+    products."""
     bounded: bool
     """Whether the rule limits K and D to a fixed range."""
 
     @property
     def margin(self) -> float:
-        """gamma_crit/gamma; above 1, the adaptation is stable."""
+        """gamma_crit/gamma. Above 1, gains and motion stay bounded in ``critical``."""
         return self.critical.rate / self.rate if self.rate else math.inf
 
 
 def adaptation_stability(scenario: Scenario) -> AdaptationStability:
-    """Analyzes the stability of the gain adaptation of a robot on a route.
+    """Analyzes whether a robot on a route is stable while its law adapts the gains.
 
     The results come from formulas, and from simulations of a point mass with motor lag.
     The function raises an InputError if the law does not adapt its gains.
@@ -196,10 +217,11 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
 def swinging_target(
     amplitude_m: float, duration_s: float, tick_s: float
 ) -> NDArray[np.float64]:
-    """Computes a target that oscillates along x: a (sin 0.6 t + 0.5 sin 1.7 t).
+    """Computes a target that oscillates along x: x = a (sin 0.6 t + 0.5 sin 1.7 t).
 
-    The two frequencies allow the adaptation to distinguish stiffness K from damping D.
-    The result has the shape (ticks, 4): positions p_d, m, and velocities v_d, m/s.
+    a is ``amplitude_m``. With two frequencies, the adaptation can distinguish the
+    stiffness K from the damping D. The result has the shape (ticks, 4): position (x,
+    y), m, and velocity (x, y), m/s.
     """
     time = np.arange(0.0, duration_s, tick_s)
     targets = np.zeros((len(time), 4))
@@ -211,9 +233,10 @@ def swinging_target(
 def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
     """Finds the least adaptation rate at which gains or motion diverge within 60 s.
 
-    The adaptation rule has no limits of the gains. Ten rates per decade are tried. The
-    interval below the first divergent rate is bisected. Some higher rates may not
-    diverge. If no allowed rate is critical, the rate is infinite.
+    The gains have no limits. The target is that of ``swinging_target``. The function
+    tries ten rates per decade, and then bisects the interval below the first rate with
+    divergence. At some higher rates, there may again be no divergence. If no allowed
+    rate leads to divergence, the rate in the result is infinite.
     """
     targets = swinging_target(amplitude_m, _CRITICAL_S, loop.tick_s)
 
@@ -236,24 +259,30 @@ def critical_rate(loop: PointLoop, amplitude_m: float) -> CriticalRate:
 
 
 def drift_stiffness(start: float, rate: float, push: float, time_s: float) -> float:
-    """Computes the stiffness K(t), N/m, of the gradient rule under a constant push, N.
+    """Computes the stiffness K(t) of the gradient rule under a constant push, N/m.
 
-    Under the push F, the robot rests off its target by F/K. The sensitivity of its
-    position p is dp/dK = -F/K^2. The gradient rule therefore gives K^3 K' = gamma F^2.
-    K starts at ``start``. The adaptation rate gamma has the unit (N/m)^2/(m^2 s).
+    Under the push F, the robot rests at the distance F/K from its target. The
+    sensitivity of its position p to K is dp/dK = -F/K^2. The gradient rule therefore
+    gives K^3 dK/dt = gamma F^2.
+
+    ``start`` is K at the time 0, N/m. ``rate`` is gamma, (N/m)^2/(m^2 s). ``push`` is
+    F, N.
     """
     return float((start**4 + 4.0 * rate * push**2 * time_s) ** 0.25)
 
 
 def _unlimited(loop: PointLoop, rate: float | None = None) -> PointLoop:
-    """Returns the loop without limits of K and D, and without the safety term."""
+    """Returns a copy in which only K and D adapt, without limits and safety term.
+
+    ``rate`` replaces the adaptation rate of K and D.
+    """
     plain = {"projected": False, "penalty": 0.0, "contact_rate": 0.0}
     rates = {} if rate is None else {"rate": rate}
     return loop._replace(law=loop.law.model_copy(update={**plain, **rates}))
 
 
 def _lyapunov(loop: PointLoop, wanted: tuple[float, float]) -> LyapunovRun:
-    """Simulates the continuous and the sampled loop from wrong gains."""
+    """Simulates the continuous and the sampled loop from half of the desired gains."""
     mass, rate = loop.robot.mass_kg, loop.law.rate
     assert loop.poles is not None
     frequency, ratio = loop.poles
@@ -310,7 +339,11 @@ def _energy(
     frequency: float,
     rate: float,
 ) -> NDArray[np.float64]:
-    """V = w_n^2 e^2/2 + e_v^2/2 + ((K - K*)^2 + (D - D*)^2)/(2 gamma)."""
+    """Computes V = w_n^2 e^2/2 + e_v^2/2 + ((K - K*)^2 + (D - D*)^2)/(2 gamma).
+
+    e and e_v are the deviations of position and velocity from the reference. K* and D*
+    are the desired gains.
+    """
     p, v, p_r, v_r = motion.T
     off = ((gains - np.array(wanted)) ** 2).sum(axis=1)
     square = frequency**2 * (p - p_r) ** 2 + (v - v_r) ** 2
@@ -346,7 +379,7 @@ def _drift(loop: PointLoop) -> Drift:
 
 
 def _jam(loop: PointLoop) -> Jam:
-    """Simulates a jam. The target moves on during the jam, and then stops."""
+    """Simulates a jam. The target moves on during the jam, and stops at its end."""
     time = np.arange(0.0, _JAM_S + _AFTER_S, loop.tick_s)
     jammed = time < _JAM_S
     targets = np.zeros((len(time), 4))

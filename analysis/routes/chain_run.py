@@ -1,4 +1,7 @@
-"""Simulates a line of robots that follow one another, by the law in discrete time."""
+"""Simulates a line of robots (chain) in which each robot follows the robot ahead.
+
+The simulation is in discrete time and calls the functions of the law.
+"""
 
 from __future__ import annotations
 
@@ -36,11 +39,14 @@ from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 #: Number of robots in a simulated chain, including the first.
 _ROBOTS = ROBOTS[-1]
-#: Amplitude of the first robot's oscillation, m. Far too small to reach any limit.
+#: Amplitude of the first robot's oscillation, m. With this amplitude, speeds and
+#: accelerations stay far below their limits.
 _SHAKEN_M = 0.002
-# Number of simulated periods, and number of final periods that give the amplitudes.
+# Number of simulated periods of the oscillation, and number of the last periods from
+# which the amplitudes are computed.
 _PERIODS, _READ = 40, 5
-# Simulated time after and before the first robot begins to brake, s.
+# Simulated times after and before the instant at which the first robot begins to brake,
+# s.
 _WATCHED_S, _DRIVEN_S = 25.0, 40.0
 
 
@@ -48,21 +54,23 @@ class ChainNumbers(NamedTuple):
     """Parameters of a simulated line of robots (chain), for the compiled code."""
 
     gains: tuple[float, float, float, float]
-    """K, D, K_e and D_e: stiffness and damping to the target, and those of contacts."""
+    """Stiffness K (N/m) and damping D (N s/m) to the target, and stiffness K_e and
+    damping D_e of contacts."""
     feed_forward: float
-    """Target velocity over velocity of the robot ahead."""
+    """Velocity of the target divided by the velocity of the robot ahead."""
     spacing_m: float
-    """Desired distance between the points P of neighbors, m."""
+    """Desired distance between the control points P of neighbors, m."""
     offset_ahead_m: float
-    """Distance between points P minus that to the disc of the robot ahead, m."""
+    """First offset of ``disc_offsets``, for the robot ahead, m."""
     offset_behind_m: float
-    """Distance between points P minus that to the disc of the robot behind, m."""
+    """Second offset of ``disc_offsets``, for the robot behind, m."""
     contacts: ContactNumbers
     mass: float
     top_speed: float
     """Largest speed of P, m/s."""
     motors: tuple[float, float]
-    """Share of the old speed after a control period, and coasting per old speed, s."""
+    """Share of the old speed that remains after a control period. Distance that the
+    robot coasts in this period, divided by the old speed, s."""
     late_ticks: int
     """Latency of the observed neighbors, in control periods."""
     tick_s: float
@@ -80,7 +88,7 @@ def _object(
 
 @njit(cache=True)
 def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cover
-    """Positions P at each control period; the robots start in formation."""
+    """Returns the (ticks, robots) positions of P, m. The robots start in formation."""
     ticks, robots, tick_s = len(first), len(gaps) + 1, numbers.tick_s
     places = np.empty((ticks, robots))
     begin = (first[1] - first[0]) / tick_s
@@ -94,7 +102,8 @@ def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cov
     for tick in range(ticks):
         p[0] = first[tick]
         places[tick] = p
-        # Observed positions are one latency old. Before the start, speeds are equal.
+        # Observed positions are ``late`` ticks old. Before the start of the simulation,
+        # all robots drive at the same speed.
         seen, speed = np.empty(robots), np.full(robots, begin)
         for i in range(robots):
             then = tick - late
@@ -141,15 +150,15 @@ def run_chain(
 ) -> NDArray[np.float64]:
     """Simulates robots that follow one another on a line, behind a given first robot.
 
-    The simulation uses the law's own functions. The simulation includes contacts with
-    both neighbors, the limits of acceleration and speed, and the motor lag, but no
-    safety filter.
+    The simulation calls the functions of the law. It includes contacts with both
+    neighbors, the limits of acceleration and speed, and the motor lag. It has no safety
+    filter.
 
-    All positions are those of the control point P ahead of the axle, m: the result has
-    the shape (ticks, robots). The first step of the (ticks,) positions ``first_m``
-    gives the initial speed of all robots. ``feed_forward`` is the target velocity over
-    the velocity of the robot ahead. ``spacing_m`` is the desired distance between
-    neighbors.
+    The result has the (ticks, robots) positions of the control points P along the line,
+    m. ``first_m`` are the (ticks,) positions of the first robot, m. All robots start at
+    the speed that the first robot has in its first step. ``feed_forward`` is the
+    velocity of a robot's target divided by the velocity of the robot ahead.
+    ``spacing_m`` is the desired distance between the points P of neighbors, m.
     """
     own, robot, tick_s = route_law(scenario), scenario.only.robot, scenario.tick_s
     lag = scenario.only.plant.motor_lag_s
@@ -177,14 +186,14 @@ def run_chain(
 
 @dataclass(frozen=True)
 class ChainRun:
-    """Amplitudes in an oscillating chain, by simulation and by frequency response."""
+    """Amplitudes in a chain whose first robot oscillates: simulated and predicted."""
 
     name: str
     frequency_rad_s: float
     simulated: NDArray[np.float64]
-    """(robots,) simulated amplitude of each robot over that of the first."""
+    """(robots,) simulated amplitude of each robot, divided by that of the first."""
     predicted: NDArray[np.float64]
-    """(robots,) amplitude ratios predicted by ``chain_response``."""
+    """(robots,) the same ratios by the frequency response ``chain_response``."""
 
     @property
     def difference(self) -> float:
@@ -195,9 +204,11 @@ class ChainRun:
 def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
     """Simulates eight robots on a line, of which the first oscillates.
 
-    The oscillation has the frequency of the largest amplification. If nothing is
-    amplified, the oscillation has the natural frequency of a robot. The amplitudes are
-    those of the last five of forty periods.
+    ``peak`` gives the feed-forward and the spacing of the chain. It also gives the
+    frequency of the oscillation, at which the chain amplifies most. If the chain
+    amplifies at no frequency, the oscillation has the natural frequency of a robot. The
+    simulation lasts forty periods. The amplitudes in the result are those of the last
+    five periods. ``name`` is the name of the result.
     """
     natural = math.sqrt(route_law(scenario).stiffness_n_m / scenario.only.robot.mass_kg)
     omega = peak.frequency_rad_s if peak.grows else natural
@@ -220,17 +231,17 @@ def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
 
 @dataclass(frozen=True)
 class BrakedChain:
-    """Gaps in a chain whose first robot brakes from the target's speed to rest."""
+    """Gaps between robots of a chain whose first robot brakes to rest."""
 
     name: str
     time_s: NDArray[np.float64]
     """(n,) time since the first robot began to brake, s."""
     gap_m: NDArray[np.float64]
-    """(n, robots - 1) distance between the points P of neighbors, m."""
+    """(n, robots - 1) distance between the control points P of neighbors, m."""
     least_gap_m: NDArray[np.float64]
-    """(robots - 1,) least distance after the braking began, m."""
+    """(robots - 1,) least of these distances after the braking began, m."""
     overshoot_m: NDArray[np.float64]
-    """(robots - 1,) final distance minus least distance, m."""
+    """(robots - 1,) last of these distances minus the least one, m."""
 
 
 def brake_chain(
@@ -238,8 +249,9 @@ def brake_chain(
 ) -> BrakedChain:
     """Simulates eight robots in formation, of which the first brakes to rest.
 
-    The scenario's route gives the speed and the braking acceleration. The other
-    arguments are those of ``run_chain``.
+    The speed before braking is the speed of the scenario's route, and the deceleration
+    is the acceleration of this route. ``feed_forward`` and ``spacing_m`` are those of
+    ``run_chain``. ``name`` is the name of the result.
     """
     speed, slope = (
         scenario.router.route.speed_m_s,

@@ -38,11 +38,11 @@ from systems.laws.trajectory.trajectory_conventional import (
 
 #: Desired damping ratio.
 WELL_DAMPED = 0.7
-#: Delays of the position for which bounds are computed, in control periods. The first
-#: is that of the model. The second adds the delay of a processor.
+#: Delays of the position that the springs use, in control periods. Bounds are computed
+#: for each of them. In the simulation, the delay is 0. A real processor may add 1.
 LATE_TICKS = (0, 1)
-# Chart over damping: number of points, least damping in N s/m, and largest damping as
-# a share of its bound.
+# Dampings of the curves: their number, the least damping, N s/m, and the largest
+# damping as a share of its bound.
 _CHART_POINTS, _LEAST_N_S_M, _MOST = 60, 0.5, 0.97
 _HALVINGS = 50
 
@@ -54,13 +54,15 @@ class FrozenPoint:
     at: RoutePoint
     """The operating point."""
     stiffness_n_m: float
-    """Sum of all springs along the route, N/m."""
+    """Stiffness along the route: to the target, plus that of a contact if any, N/m."""
     damping_n_s_m: float
-    """Sum of all dampers along the route, N s/m."""
+    """Damping along the route: to the target, plus that of a contact if any, N s/m."""
     model: LinearModel
-    """Closed loop from the target to the control point P."""
+    """Closed loop from the motion of the target to the position of the control point
+    P."""
     margins: dict[str, LoopMargins]
-    """Margins of the loop cut at the acceleration, along and across the route."""
+    """Margins of the loop that is cut at the law's acceleration. The keys are the
+    directions ``AXES``: along and across the route."""
 
 
 def frozen_gains(scenario: Scenario) -> tuple[FrozenPoint, ...]:
@@ -92,42 +94,55 @@ def _frozen(scenario: Scenario, point: RoutePoint) -> FrozenPoint:
 
 @dataclass(frozen=True)
 class GainBounds:
-    """Bounds of stiffness K and damping D, some for each delay of the position."""
+    """Bounds of the stiffness and of the damping of a robot on a route.
+
+    Stiffness is the sum of all springs, and damping is the sum of all dampers. Some
+    bounds have one value for each delay of the position that the springs use.
+    """
 
     mass: SampledMass
     """Mass, motor lag and control period."""
     late_ticks: tuple[int, ...]
-    """Delays of the position in control periods, one per column of the curves."""
+    """Delays of the position, in control periods."""
     damping_n_s_m: NDArray[np.float64]
-    """(n,) dampings of the curves, N s/m."""
+    """(n,) dampings for which ``stable_n_m`` and ``damped_n_m`` have rows, N s/m."""
     stable_n_m: NDArray[np.float64]
     """(n, delays) stiffness at which the loop becomes unstable, N/m."""
     damped_n_m: NDArray[np.float64]
     """(n, delays) stiffness up to which the damping ratio is 0.7 or more, N/m."""
     today: dict[str, tuple[float, float]]
-    """(K, D) of the scenario, for the target alone and with a contact."""
+    """(stiffness, damping) of the scenario, N/m and N s/m: with the target alone
+    (``target``), and with a contact at half of its zone (``half way in``)."""
     stable_today_n_m: tuple[float, ...]
-    """Stiffness at which the loop with the scenario's damping becomes unstable, N/m."""
+    """(delays,) stiffness at which the loop with the scenario's damping D becomes
+    unstable, N/m."""
     damped_today_n_m: tuple[float, ...]
-    """Stiffness up to which that loop has a damping ratio of at least 0.7, N/m."""
+    """(delays,) stiffness up to which the loop with the scenario's damping D has a
+    damping ratio of at least 0.7, N/m."""
     closed_form_n_m: tuple[float, ...]
-    """``stable_today_n_m`` as computed by ``stiffness_bound``, N/m."""
+    """(delays,) the bounds ``stable_today_n_m`` by the formula ``stiffness_bound``,
+    N/m."""
     most_damping_n_s_m: float
-    """Largest stable sum of dampers, by bisection, N s/m."""
+    """Largest damping with which the loop without springs is stable, by bisection,
+    N s/m."""
     closed_damping_n_s_m: float
-    """Largest stable sum of dampers by the formula 2 M/T, N s/m."""
+    """The same damping by the formula 2 M/T, N s/m. M is the virtual mass, and T is the
+    control period."""
     contacts: float
-    """Largest stable number of contacts with full damping; infinite without damping."""
+    """Largest number of contacts whose full dampings may act at once. Infinite if
+    contacts have no damping."""
     box: tuple[tuple[float, float], tuple[float, float]] | None
-    """Ranges of K and of D to which the adaptation is limited; None without limits."""
+    """Ranges of K and of D to which the adaptation is limited. None if the law does not
+    limit its gains."""
 
 
 def gain_bounds(scenario: Scenario) -> GainBounds:
-    """Computes bounds of stiffness K and damping D by bisection.
+    """Computes bounds of the stiffness and of the damping by bisection.
 
-    Stability follows from the eigenvalues of the blocks' state matrix over one control
-    period. The function raises an InputError if the law is not for a route, or if the
-    wheels can slip.
+    The loop is stable if the eigenvalues of its state matrix over one control period
+    are inside the unit circle. The matrix comes from the linearized blocks. The
+    function raises an InputError if the law is not for a route, or if the wheels can
+    slip.
     """
     own = route_law(scenario)
     of = SampledMass(
@@ -168,9 +183,10 @@ def axis_damping_ratio(
 ) -> float:
     """Computes the damping ratio of the least damped mode along one axis.
 
-    The ratio is the least value of -Re s/|s| over all modes; 1 if no mode oscillates.
-    ``stiffness`` is the sum of all springs, N/m, above 0. ``damping`` is the sum of all
-    dampers, N s/m. The springs act on a position that is ``late_ticks`` old.
+    The result is the least value of -Re s/|s| over all poles s, or 1 if no mode
+    oscillates. ``stiffness`` is the sum of all springs, N/m, and must be above 0.
+    ``damping`` is the sum of all dampers, N s/m. The springs use a position that is
+    ``late_ticks`` control periods old.
     """
     return contact_model(
         scenario, stiffness, damping_n_s_m=damping, latency_ticks=late_ticks
@@ -178,10 +194,10 @@ def axis_damping_ratio(
 
 
 def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) -> float:
-    """Computes the largest stiffness with a damping ratio of at least 0.7, N/m.
+    """Computes the stiffness up to which the damping ratio is at least 0.7, N/m.
 
-    The sum of all dampers is ``damping``, N s/m. If no stiffness has this damping
-    ratio, the result is 0.
+    The arguments are those of ``axis_damping_ratio``. If even a very small stiffness
+    has a lower damping ratio, the result is 0.
     """
     return _last(
         lambda k: axis_damping_ratio(scenario, k, damping, late_ticks) >= WELL_DAMPED
@@ -189,7 +205,11 @@ def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) ->
 
 
 def _bounds(scenario: Scenario, damping: float, late: int) -> tuple[float, float]:
-    """Stiffness at which one axis becomes unstable, and at which it oscillates, N/m."""
+    """Returns the two bounds of the stiffness for one damping and one delay, N/m.
+
+    At the first, the loop becomes unstable. Up to the second, the damping ratio is at
+    least 0.7.
+    """
 
     def rests(stiffness: float) -> bool:
         return contact_model(
@@ -200,7 +220,10 @@ def _bounds(scenario: Scenario, damping: float, late: int) -> tuple[float, float
 
 
 def _last(holds: Callable[[float], bool], begin: float = 1e-3) -> float:
-    """Upper end of the interval from 0 in which a condition holds; 0 if it is empty."""
+    """Returns the value up to which a condition holds, by bisection.
+
+    The condition must hold at ``begin``; otherwise the result is 0.
+    """
     if not holds(begin):
         return 0.0
     low, high = begin, 2.0 * begin
@@ -213,7 +236,7 @@ def _last(holds: Callable[[float], bool], begin: float = 1e-3) -> float:
 
 
 def _most_damping(scenario: Scenario) -> float:
-    """Damping at which a damper without a spring becomes unstable, N s/m."""
+    """Returns the damping at which the loop without springs becomes unstable, N s/m."""
 
     def rests(damping: float) -> bool:
         poles = contact_model(scenario, 0.0, damping_n_s_m=damping).poles

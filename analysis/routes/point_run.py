@@ -1,4 +1,4 @@
-"""Simulates a point that obeys the law of a route, in compiled code."""
+"""Simulates a point that obeys a law for routes, in compiled code."""
 
 from __future__ import annotations
 
@@ -31,41 +31,49 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.objects import KNOWN, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Objects with larger x are ignored, m.
+#: Contact points with a larger x are ignored, m.
 _FAR_M = 1e6
 
 
 class PointLoop(NamedTuple):
-    """A law, and the robot that the law moves."""
+    """A law for routes, and the robot that the law moves."""
 
     law: AdaptiveTrajectoryParameters
     poles: tuple[float, float] | None = None
-    """w_n, rad/s, and xi of the reference model; None: those of the law's gains."""
+    """Natural frequency w_n, rad/s, and damping ratio xi of the reference model. With
+    None, they follow from the gains of the law and the virtual mass."""
     robot: RobotParameters = RobotParameters()
     motor_lag_s: float = 0.0
     tick_s: float = TICK_S
 
 
 class PointRun(NamedTuple):
-    """States at each control period, before its updates. P is the control point."""
+    """Motion and gains at each control period (tick), before the updates of this tick.
+
+    P is the control point, which carries the virtual mass. Only the sensitivities are
+    those after the update of the tick.
+    """
 
     motion: NDArray[np.float64]
-    """(ticks, 4) position p and velocity v of P's virtual mass, x and y, m and m/s."""
+    """(ticks, 4) position p of P (x, y), m, and velocity v of the virtual mass (x, y),
+    m/s. With motor lag, the velocity of P differs from v."""
     gains: NDArray[np.float64]
-    """(ticks, 3) stiffness K, damping D and contact stiffness K_e."""
+    """(ticks, 3) stiffness K, N/m, damping D, N s/m, and contact stiffness K_e, N/m."""
     sensitivities: NDArray[np.float64]
-    """(ticks, 12) sensitivities of p and v to K, D and K_e, after the update."""
+    """(ticks, 12) partial derivatives of p and v with respect to K, D and K_e, in SI
+    units. The order is that of the state of ``adaptation_step``."""
     reference: NDArray[np.float64]
-    """(ticks, 4) position and velocity of the reference, m and m/s."""
+    """(ticks, 4) position (x, y) and velocity (x, y) of the reference model, m and
+    m/s."""
 
 
 class _Motors(NamedTuple):
     """Effect of the motor lag on the control point P over a control period."""
 
     kept: float
-    """Share of the old speed in the new speed."""
+    """Share of the old speed that remains after the period."""
     coasting_s: float
-    """Coasting distance per old speed, s."""
+    """Distance that P coasts in the period, divided by the old speed, s."""
 
 
 @njit(cache=True)
@@ -130,15 +138,20 @@ def run_point(
 ) -> PointRun:
     """Simulates a point robot with reference model, gain adaptation and control law.
 
-    The simulation includes the virtual mass of control point P, and the motor lag. The
-    simulation has no heading, and no limits of speed and acceleration. The formulas of
-    the analysis make the same assumptions.
+    The simulation includes the virtual mass at the control point P, and the motor lag.
+    The simulation has no heading, and no limits of speed and acceleration. The formulas
+    in ``analysis.routes.adaptation_stability`` make the same assumptions.
 
-    The (ticks, 4) ``targets`` are positions and velocities of the target, m and m/s.
-    The (ticks, n, 4) or (n, 4) ``places`` are those of contact points; points with x
-    beyond 1e6 m are ignored. The run starts at the (4,) ``start``, or at the first
-    target. ``push`` is a constant force on P, N. ``held`` is the largest x that P can
-    reach, m, either (ticks,) or one value for all control periods.
+    Each position is (x, y), m, and each velocity is (x, y), m/s:
+
+    - ``targets``: (ticks, 4) position and velocity of the target.
+    - ``places``: (ticks, n, 4) or (n, 4) positions and velocities of n points. They
+      push P while P is in their security zone. Points with x of 1e6 m or more are
+      ignored.
+    - ``start``: (4,) initial position and velocity of P; by default those of the first
+      target.
+    - ``push``: constant force on P, N.
+    - ``held``: largest x that P can reach, m; (ticks,), or one value for all ticks.
     """
     wanted = np.asarray(targets, dtype=float)
     points = np.asarray(places, dtype=float)

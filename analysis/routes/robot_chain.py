@@ -1,4 +1,7 @@
-"""Computes whether disturbances grow along a line of robots that follow one another."""
+"""Computes whether disturbances grow along a line of robots (chain).
+
+Each robot of the chain follows the robot ahead. The first robot moves on its own.
+"""
 
 from __future__ import annotations
 
@@ -20,28 +23,32 @@ from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
 
 #: Numbers of robots in the analyzed chains, including the first robot.
 ROBOTS = tuple(range(2, 9))
-# Frequency grid up to the Nyquist frequency: lowest frequency in rad/s, and number of
-# points. Frequencies near the modes are added.
+# Grid of frequencies up to the Nyquist frequency. ``_LOWEST``: lowest frequency, rad/s.
+# ``_POINTS``: number of frequencies, without those that are added near the modes.
 _LOWEST, _POINTS = 1e-2, 600
-# A peak up to this much above 1 does not count. At zero frequency, the response is 1.
+# An amplification counts as above 1 only if it exceeds 1 by more than this value. At
+# zero frequency, it is 1 up to rounding.
 _ROUNDING = 1e-6
 _HALVINGS = 40
 # Distance from P to the disc of the robot ahead in a chain without contacts, as a
-# multiple of the security zone.
+# multiple of the radius of the security zone.
 _APART = 1.25
 # Values of the damping D that are tried, N s/m.
 _DAMPINGS = np.geomspace(0.05, 60.0, 80)
 
 
 class ChainLinks(NamedTuple):
-    """Springs and dampers between a robot and its neighbors, for small motions."""
+    """Springs and dampers between a robot and its neighbors, for small motions.
+
+    The target of the robot is the desired position behind the robot ahead.
+    """
 
     stiffness: float
-    """Stiffness K to the desired position behind the robot ahead, N/m."""
+    """Stiffness K between the position of the robot and that of its target, N/m."""
     damping: float
-    """Damping D to the target's velocity, N s/m."""
+    """Damping D between the velocity of the robot and that of its target, N s/m."""
     feed_forward: float
-    """Target velocity over velocity of the robot ahead."""
+    """Velocity of the target divided by the velocity of the robot ahead."""
     ahead: tuple[float, float] = (0.0, 0.0)
     """Stiffness, N/m, and damping, N s/m, of the contact with the robot ahead."""
     behind: tuple[float, float] = (0.0, 0.0)
@@ -52,32 +59,33 @@ class ChainLinks(NamedTuple):
 
 @dataclass(frozen=True)
 class ChainPeak:
-    """How much a line of robots (chain) amplifies the motion of its first robot.
+    """How much chains of 2 to 8 robots amplify the motion of their first robot.
 
-    If the chain is unstable, all amplifications are infinite. P is a robot's control
-    point ahead of the axle.
+    The amplification of a robot is its amplitude divided by that of the first robot. A
+    peak is the largest amplification over all frequencies. If a chain is unstable, its
+    peaks are infinite.
     """
 
     feed_forward: float
-    """Target velocity over velocity of the robot ahead."""
+    """Velocity of a robot's target divided by the velocity of the robot ahead."""
     spacing_m: float
-    """Desired distance between the points P of neighbors, m."""
+    """Desired distance between the control points P of neighbors, m."""
     peak: float
-    """Largest amplification by a chain of two robots over all frequencies."""
+    """Peak of the second robot in a chain of two robots."""
     omega: NDArray[np.float64]
     """(n,) frequencies, rad/s."""
     gain: NDArray[np.float64]
-    """(n, robots - 1) amplitude of each robot over that of the first, longest chain."""
+    """(n, 7) amplification of each robot after the first, in a chain of eight."""
     each: tuple[float, ...]
-    """Largest amplification over frequency for each robot of the longest chain."""
+    """(7,) peak of each robot after the first, in a chain of eight."""
     tail: dict[int, float]
-    """Largest amplification from the first to the last robot, by number of robots."""
+    """Peak of the last robot of a chain, by the number of robots in the chain."""
     frequency_rad_s: float
-    """Frequency of the largest amplification of the longest chain's last robot."""
+    """Frequency of the peak of the last robot in a chain of eight, rad/s."""
 
     @property
     def grows(self) -> bool:
-        """Whether any robot oscillates more than the first at any frequency."""
+        """Whether any robot oscillates more than the first robot at any frequency."""
         return max(*self.each, *self.tail.values()) > 1.0 + _ROUNDING
 
 
@@ -87,27 +95,37 @@ class RobotChain:
 
     All robots have the scenario's gains. Spacing and feed-forward differ between
     chains. A chain is "apart" if the robots are outside each other's security zones.
-    Otherwise, the chain is "in contact".
+    Otherwise, the chain is "in contact". With feed-forward, the target of a robot has
+    the velocity of the robot ahead. Without feed-forward, it has the velocity 0.
     """
 
     stiffness_n_m: float
     damping_n_s_m: float
     peaks: dict[str, ChainPeak]
-    """Largest amplification of each chain, by name of the chain."""
+    """Amplifications of each kind of chain, by name of the kind."""
     least_damping_n_s_m: float
-    """Least D at which a pair apart without feed-forward does not amplify, N s/m."""
+    """Least damping D with which a chain of two robots does not amplify motions, N s/m.
+    The chain is apart and has no feed-forward. Infinite if no tried D suffices."""
     least_damping_in_contact_n_s_m: float
-    """The same for eight robots in contact, N s/m; infinite if no tried D suffices."""
+    """The same for eight robots in contact, N s/m."""
     most_feed_forward: float
-    """Largest feed-forward without amplification; negative if none is small enough."""
+    """Largest feed-forward with which a chain of two robots that is apart does not
+    amplify motions: velocity of the target divided by that of the robot ahead. -1 if
+    the chain amplifies motions even without feed-forward."""
     dampings: NDArray[np.float64]
     """(n,) tried values of D, N s/m."""
     peaks_by_damping: NDArray[np.float64]
-    """(n, 2) largest amplification with and without feed-forward; inf if unstable."""
+    """(n, 2) largest amplification over all frequencies by a chain of two robots that
+    is apart, for each tried D: with feed-forward, and without. Infinite if the chain is
+    unstable."""
 
     @property
     def time_headway_s(self) -> float:
-        """Time headway D/K, s: growth of the gap per speed, without feed-forward."""
+        """Time headway D/K without feed-forward, s.
+
+        At a constant speed, each gap is larger than at rest by the speed multiplied by
+        this time.
+        """
         return self.damping_n_s_m / self.stiffness_n_m
 
 
@@ -115,10 +133,11 @@ def robot_chain(scenario: Scenario) -> RobotChain:
     """Computes frequency responses of lines of robots that follow one another.
 
     All robots are like the scenario's robot. Each robot's target is a fixed distance
-    behind the robot ahead, and has the velocity of the robot ahead. The object sensor
-    measures the position of the robot ahead. The velocity is computed from the last two
-    positions. The function raises an InputError if the law is not for a route, or if
-    the wheels can slip.
+    behind the robot ahead. With feed-forward, the target has the velocity of the robot
+    ahead; without, it has the velocity 0. The object sensor measures the position of
+    the robot ahead. The velocity of the robot ahead is computed from the last two
+    measured positions. The function raises an InputError if the law is not for a route,
+    or if the wheels can slip.
     """
     own = route_law(scenario)
     k, d = own.stiffness_n_m, own.damping_n_s_m
@@ -158,9 +177,9 @@ def chain_spacings(scenario: Scenario) -> tuple[float, float]:
     """Computes two distances between neighboring robots, m: without and with contacts.
 
     The distances are between the control points P. Other robots observe a moving robot
-    as the disc that encloses it. With the first distance, P is 1.25 security zones from
-    the disc of the robot ahead. With the second, P is half a security zone from the
-    disc.
+    as the disc that encloses it. The distance from P to the disc of the robot ahead is
+    1.25 times the radius S of the security zone for the first result, and S/2 for the
+    second.
     """
     zone_m = route_law(scenario).security_zone_m
     offset = disc_offsets(scenario)[0]
@@ -170,9 +189,11 @@ def chain_spacings(scenario: Scenario) -> tuple[float, float]:
 def disc_offsets(scenario: Scenario) -> tuple[float, float]:
     """Computes how much nearer a neighbor's disc is than its control point P, m.
 
-    The first offset is for the robot ahead, and the second for the robot behind. Other
-    robots observe a moving robot as the disc that encloses it. The disc has its center
-    at the axle, and P is ahead of the axle.
+    Other robots observe a moving robot as the disc that encloses it. The disc has its
+    center at the axle, and P is ahead of the axle. Each result is the distance between
+    the points P of two neighbors, minus the distance from one of these points to the
+    disc of the other robot. In the first result, the other robot is ahead. In the
+    second, it is behind.
     """
     disc = 0.5 * math.hypot(scenario.only.robot.length_m, scenario.only.robot.width_m)
     epsilon = scenario.only.robot.control_point_m
@@ -186,16 +207,18 @@ def _late(scenario: Scenario) -> int:
 def resting_gaps(
     scenario: Scenario, spacing_m: float, robots: int
 ) -> NDArray[np.float64]:
-    """Computes the (robots - 1,) distances between the points P of a chain at rest, m.
+    """Computes the distances between the control points P of a chain at rest, m.
 
-    The first distance is that behind the first robot. ``spacing_m`` is the desired
-    distance. Contacts push the robots apart. The computation starts at the last robot,
-    which has a contact only with the robot ahead.
+    The result has the shape (robots - 1,). Its first distance is between the first and
+    the second robot. ``spacing_m`` is the desired distance. Contacts push the robots
+    apart. The computation starts at the last robot, which has a contact only with the
+    robot ahead.
     """
     own = route_law(scenario)
     k, k_e, zone_m = own.stiffness_n_m, own.contact_stiffness_n_m, own.security_zone_m
     ahead, behind = disc_offsets(scenario)
-    # Force along the line of a contact with the robot ahead: k_e (d - S).
+    # A contact with the robot ahead at the distance d exerts the force k_e (d - S)
+    # along the line. S is the radius of the security zone.
     gaps, pushed = np.empty(robots - 1), 0.0
     for i in reversed(range(robots - 1)):
         gap = spacing_m - pushed / k
@@ -213,9 +236,9 @@ def links_of(
 ) -> tuple[ChainLinks, ...]:
     """Computes the springs and dampers of each robot of a chain, except the first.
 
-    The chain is at rest. If a neighbor's disc is outside the security zone, its contact
-    has no stiffness and no damping. ``spacing_m`` is the desired distance between the
-    points P of neighbors.
+    They are those of small motions about the chain at rest. If the disc of a neighbor
+    is outside the security zone, its contact has no stiffness and no damping.
+    ``feed_forward`` and ``spacing_m`` are those of ``ChainPeak``.
     """
     own = route_law(scenario)
     gaps = resting_gaps(scenario, spacing_m, robots)
@@ -239,13 +262,18 @@ def links_of(
 def chain_response(
     scenario: Scenario, links: Sequence[ChainLinks], omega: ArrayLike
 ) -> NDArray[np.complex128]:
-    """Computes the response of the following robots' positions to the first robot's.
+    """Computes the frequency response from the first robot to the robots behind it.
 
-    Each robot obeys M a = -K (p - p') - D (v - c v'), plus the forces of its contacts.
-    p' and v' are position and velocity of the robot ahead, and c is the ratio of
-    velocity feed-forward. Wheel command and plant give p = G_p a and v = G_v a. The
-    first robot's motion is given. For (n,) frequencies in rad/s, the result has the
-    shape (n, len(links)).
+    The input is the position of the first robot. The outputs are the positions of the
+    other robots, one for each of ``links``. Each of these robots obeys this law, plus
+    the forces of its contacts::
+
+        M a = -K (p - p') - D (v - c v')
+
+    p and v are the deviations of the robot's position and velocity from the formation.
+    p' and v' are the observed deviations of the robot ahead, and c is the feed-forward.
+    Wheel command and plant give p = G_p a and v = G_v a. ``omega`` are (n,)
+    frequencies, rad/s. The result has the shape (n, len(links)).
     """
     grid, count = np.asarray(omega, dtype=float), len(links)
     response = motion_chain(scenario).response(grid)
@@ -275,9 +303,11 @@ def chain_response(
 
 
 def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> ChainPeak:
-    """Computes how much a line of robots (chain) amplifies its first robot's motion.
+    """Computes how much chains of 2 to 8 robots amplify their first robot's motion.
 
-    The frequencies range from 0.01 rad/s to the Nyquist frequency.
+    The frequencies range from 0.01 rad/s to the Nyquist frequency. ``feed_forward`` is
+    the velocity of a robot's target divided by the velocity of the robot ahead.
+    ``spacing_m`` is the desired distance between the control points P of neighbors, m.
     """
     most = ROBOTS[-1]
     links = {n: links_of(scenario, feed_forward, spacing_m, n) for n in ROBOTS}
@@ -296,7 +326,7 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
 
 
 def _grid(scenario: Scenario, links: Sequence[ChainLinks]) -> NDArray[np.float64]:
-    """Frequencies that resolve every mode of the chain, even lightly damped modes."""
+    """Returns frequencies that resolve the peaks of lightly damped modes, rad/s."""
     model = chain_model(scenario, links)
     return frequency_grid(model.poles, model.period_s, lowest=_LOWEST, points=_POINTS)
 
@@ -304,7 +334,10 @@ def _grid(scenario: Scenario, links: Sequence[ChainLinks]) -> NDArray[np.float64
 def _peak(
     scenario: Scenario, links: Sequence[ChainLinks], robot: int = -1
 ) -> tuple[float, float]:
-    """Largest amplification of one robot, and its frequency, rad/s."""
+    """Returns the largest amplification of one robot, and its frequency, rad/s.
+
+    ``robot`` is an index into ``links``.
+    """
     omega = _grid(scenario, links)
 
     def size(at: ArrayLike) -> NDArray[np.float64]:
@@ -324,16 +357,17 @@ def _peak(
 def chain_model(scenario: Scenario, links: Sequence[ChainLinks]) -> LinearModel:
     """Returns the sampled model of the robots behind a first robot at rest.
 
-    The model has no inputs. The outputs are the positions of the robots, m. The states
-    of each robot are those of ``sampled_matrix``, followed by the earlier positions
-    that its neighbors observe.
+    The model has no inputs. The outputs are the positions of the robots, m. Each robot
+    has the three states of ``sampled_matrix`` (position, wheel speed, and velocity of
+    the virtual mass), and then the earlier positions that its neighbors observe.
     """
     tick_s, mass = scenario.tick_s, scenario.only.robot.mass_kg
     of = SampledMass(mass, scenario.only.plant.motor_lag_s, tick_s)
     free = sampled_matrix(0.0, 0.0, of)
     late = links[0].late_ticks
     size = 3 + late + 1
-    # An acceleration a changes v by T a. The change of v then acts on w and p.
+    # A force changes the velocity v of the virtual mass. This change also acts on the
+    # wheel speed w and on the position p in the same period.
     moved = tick_s / mass * free[:, 2]
     matrix = np.zeros((size * len(links), size * len(links)))
     for i, link in enumerate(links):
@@ -370,17 +404,18 @@ def chain_model(scenario: Scenario, links: Sequence[ChainLinks]) -> LinearModel:
 def _stable_peak(
     scenario: Scenario, links: Sequence[ChainLinks], robot: int = -1
 ) -> float:
-    """Largest amplification of one robot; infinite if the chain is unstable."""
+    """Returns the amplification of ``_peak``, or infinity for an unstable chain."""
     if not chain_model(scenario, links).stable:
         return math.inf
     return _peak(scenario, links, robot)[0]
 
 
 def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
-    """Computes the least damping D, N s/m, at which no robot moves more than the first.
+    """Computes the least damping D with which no motion is amplified, N s/m.
 
-    The computation replaces the D of the links, and bisects. If no tried D suffices,
-    the result is infinite.
+    With this D, no robot oscillates more than the first robot at any frequency. D
+    replaces the damping of all ``links``. If no D up to 60 N s/m suffices, the result
+    is infinite.
     """
 
     def calm(damping: float) -> bool:
@@ -402,12 +437,12 @@ def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
 
 
 def most_feed_forward(scenario: Scenario, stiffness: float, damping: float) -> float:
-    """Computes the largest velocity feed-forward that does not amplify motions.
+    """Computes the largest feed-forward with which a robot does not amplify motions.
 
-    Feed-forward is the ratio of a target's velocity to the velocity of the robot ahead.
-    The chain has no contacts, the stiffness K in N/m and the damping D in N s/m. The
-    result is a ratio from 0 to 1, by bisection. If motions are amplified even without
-    feed-forward, the result is -1.
+    Feed-forward is the velocity of the robot's target divided by the velocity of the
+    robot ahead. The robot has no contacts. ``stiffness`` is K to the target, N/m, and
+    ``damping`` is D to the target, N s/m. The result is from 0 to 1, by bisection. If
+    the robot amplifies motions even without feed-forward, the result is -1.
     """
     late = _late(scenario)
 

@@ -29,17 +29,19 @@ from systems.laws.trajectory.trajectory_impedance_controller import (
 from systems.ranging.objects import KNOWN, THERE, X
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Directions along the route, and across the route.
+#: Directions in which the loop is analyzed: along the route and across it.
 AXES = ("along", "across")
-#: Name of the law's output, and its name where the loop is cut.
+#: Name of the law's output port, and its name after a cut. Ports with the same name are
+#: connected. With the other name, the output is not connected to any input.
 _COMMAND, _LAW = "acceleration_W", "law_W"
-#: Distances to a contact, as shares of the zone. Damping that fades depends on them.
+#: Distances from P to a wall, as shares of the radius of the security zone. They are
+#: used if the contact damping depends on the distance.
 _DEPTHS = {"edge of a zone": 0.999, "half way in": 0.5, "deep in": 0.1}
 
 
 @dataclass(frozen=True)
 class RoutePoint:
-    """An operating point at which the loop is linearized; the robot faces along x."""
+    """An operating point of the linearized loop. The robot faces along x."""
 
     name: str
     speed_m_s: float = 0.0
@@ -65,9 +67,10 @@ def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
 
 
 def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
-    """Lists operating points: on the route, at rest, and at distances from a wall.
+    """Returns the operating points: on the route, at rest, and in front of a wall.
 
-    The points at a wall exist only if the law has a contact spring or a contact damper.
+    The points in front of a wall exist only if the law has contact stiffness or contact
+    damping.
     """
     own = route_law(scenario)
     points = [
@@ -84,10 +87,10 @@ def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
 def contact_gains(
     own: TrajectoryImpedanceParameters, distance_m: float
 ) -> tuple[float, float]:
-    """Computes the stiffness, N/m, and damping, N s/m, that a contact adds.
+    """Computes the stiffness, N/m, and the damping, N s/m, that a contact adds.
 
-    They act along the contact's normal. ``distance_m`` is the distance from the control
-    point P to the object. Outside the security zone, both are 0.
+    Both act along the line from the object to the control point P. ``distance_m`` is
+    the distance between object and P. Outside the security zone, both are 0.
     """
     if distance_m >= own.security_zone_m:
         return 0.0, 0.0
@@ -96,23 +99,25 @@ def contact_gains(
 
 
 def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """Computes a minimal linear model of the closed loop over a control period.
+    """Computes a minimal sampled linear model of the closed loop.
 
-    The inputs are the target's position, m, and velocity, m/s. The outputs are the
-    position of the control point P, m. The law, wheel command, plant and odometry are
-    those of the simulation. Each block is linearized by AutoDiff. The blocks are
-    connected by the names of their ports. States that are not controllable or not
-    observable are removed. The model assumes that the safety filter is inactive, that
-    gains do not adapt, and that no limit is reached. The function raises an InputError
-    if the law is not for a route, or if the wheels can slip.
+    One step of the model is one control period. The inputs are the target's position,
+    m, and velocity, m/s. The outputs are the position of the control point P, m. The
+    law, wheel command, plant and odometry are the blocks of the simulation. AutoDiff
+    linearizes each block, and ports with the same name are connected. States that are
+    not controllable or not observable are removed. The model assumes that the safety
+    filter is inactive, that gains do not adapt, and that no limit is reached. The
+    function raises an InputError if the law is not for a route, or if the wheels can
+    slip.
     """
     return minimal_model(whole_route_model(scenario, point))
 
 
 def whole_route_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """Computes the model of ``frozen_model`` with every state.
+    """Computes the model of ``frozen_model``, but keeps all states.
 
-    The states are those of plant, odometry, wheel command and observed objects.
+    The states are those of the plant, the odometry, the wheel command and the latency
+    of the object sensor.
     """
     models = _blocks(scenario, point)
     targets = tuple(f"target_state[{k}]" for k in range(4))
@@ -131,9 +136,11 @@ def whole_route_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
 
 
 def acceleration_loop(scenario: Scenario, point: RoutePoint, axis: str) -> LinearModel:
-    """Computes the open loop L, cut at the law's acceleration along one of ``AXES``.
+    """Computes the open loop L that results from a cut at the law's acceleration.
 
-    L is for negative feedback. The loop along the other axis stays closed.
+    The cut opens the loop along ``axis``, which is one of ``AXES``. The loop along the
+    other axis stays closed. L is for negative feedback: the closed loop has its poles
+    where 1 + L = 0.
     """
     k = AXES.index(axis)
     models = tuple(
@@ -171,7 +178,10 @@ def _states(models: tuple[LinearModel, ...]) -> tuple[str, ...]:
 
 
 def _place_of_P(scenario: Scenario) -> NDArray[np.float64]:
-    """(2, 3) Jacobian from the pose to the position of P, at heading 0."""
+    """Returns the (2, 3) Jacobian of P's position with respect to the pose.
+
+    The heading is 0.
+    """
     epsilon = scenario.only.robot.control_point_m
     return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, epsilon]])
 
@@ -236,7 +246,11 @@ def _named(block: Block, model: LinearModel) -> LinearModel:
 
 
 def _seen_wall(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """Model from the pose to ``objects_W``: a wall ahead, observed with latency."""
+    """Returns the model of the object sensor, from ``pose_WB`` to ``objects_W``.
+
+    The only object is a wall straight ahead. The sensor observes the wall with the
+    latency of the scenario.
+    """
     ticks = round(scenario.router.objects.latency_s / scenario.tick_s)
     away = -_place_of_P(scenario)[:1]
     if point.wall_m is None:

@@ -1,4 +1,4 @@
-"""Plots poles, gain bounds, adaptation and chains of robots on routes."""
+"""Plots poles, bounds of the gains, adaptation and chains of robots on routes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ _HIGHEST = 4.0
 
 
 def plot_frozen_poles(points: Sequence[FrozenPoint]) -> Figure:
-    """Plots poles in the s plane at each operating point, and the desired damping."""
+    """Plots the poles at each operating point in the s plane.
+
+    Two lines mark the damping ratio ``WELL_DAMPED``.
+    """
     figure = Figure(figsize=(7.2, 4.6), layout="constrained")
     axes = figure.subplots()
     for k, point in enumerate(points):
@@ -60,7 +63,11 @@ def plot_frozen_poles(points: Sequence[FrozenPoint]) -> Figure:
 
 
 def plot_gain_bounds(bounds: GainBounds) -> Figure:
-    """Plots the plane of D and K with its stable and its well-damped regions."""
+    """Plots bounds of the sum of all springs over the sum of all dampers.
+
+    Below the bounds, the loop is stable or has a damping ratio of at least
+    ``WELL_DAMPED``. Markers show the gains of the scenario.
+    """
     figure = Figure(figsize=(7.2, 5.0), layout="constrained")
     axes = figure.subplots()
     damping = bounds.damping_n_s_m
@@ -110,7 +117,10 @@ def plot_gain_bounds(bounds: GainBounds) -> Figure:
 
 
 def plot_adaptation(found: AdaptationStability) -> Figure:
-    """Plots V over time if the rule has a V, and K under a push over time."""
+    """Plots the stiffness K over time while a constant force pushes the robot.
+
+    If the rule has a Lyapunov function V, a second panel shows V over time.
+    """
     both = found.lyapunov is not None
     figure = Figure(figsize=(9.4 if both else 5.4, 3.8), layout="constrained")
     cells = figure.subplots(1, 2 if both else 1, squeeze=False)[0]
@@ -148,10 +158,14 @@ def plot_adaptation(found: AdaptationStability) -> Figure:
 
 
 def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
-    """Plots the amplification along a chain of robots in three panels.
+    """Plots in three panels how much chains of robots amplify motions.
 
-    The panels show it over frequency, over the number of the robot, and over the
-    damping D. Dots show the amplitudes of the simulations ``runs``.
+    The amplification is the amplitude of a robot divided by that of the first robot:
+
+    - Left: amplification by two robots over frequency.
+    - Middle: amplification by eight robots over the number of the robot, at one
+      frequency. Dots show the simulations ``runs``.
+    - Right: largest amplification by two robots over the damping D.
     """
     figure = Figure(figsize=(11.4, 3.9), layout="constrained")
     left, middle, right = figure.subplots(1, 3)

@@ -1,8 +1,8 @@
 """Defines the meaning and the unit of each column in the table of a run.
 
-The blocks of the model define the names of most columns. The port tables of the blocks
-define the units. ``tests/analysis/runs/test_columns.py`` checks that names and units
-agree with the definitions here.
+Most columns come from ports of the blocks of the model. The blocks define the names and
+the units of their ports. ``tests/analysis/runs/test_columns.py`` checks that the names
+and units in this file agree with those of the blocks.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Column(NamedTuple):
     """Meaning and unit of one column, or of columns that differ only in a number."""
 
     name: str
-    """Name of the column. ``{k}`` replaces a number that counts from 1."""
+    """Name of the column. ``{k}`` stands for a number, from 1."""
     unit: str
     """Unit of the column. ``1`` means dimensionless, ``0 or 1`` means a truth value,
     and ``number`` means a code or a count."""
@@ -237,10 +237,11 @@ _BY_NAME = {column.name: column for column in COLUMNS}
 
 
 def column_of(name: str) -> Column | None:
-    """Returns the unit and the meaning of a column, or None for a user's own block.
+    """Returns the unit and the meaning of a column, or None if they are unknown.
 
-    The name may begin with the name of a robot and a dot. If it contains a number, the
-    meaning contains this number, too.
+    They are unknown for a column of a user's own block. The name may begin with the
+    name of a robot and a dot. If the name contains a number, the meaning contains this
+    number, too.
     """
     own = name.rpartition(".")[2]
     number = re.search(r"(?<=_)\d+", own)
@@ -253,11 +254,11 @@ def column_of(name: str) -> Column | None:
 
 
 def columns(of: RunResult | Iterable[str] | None = None) -> pd.DataFrame:
-    """Returns a data dictionary with the unit and the meaning of each column of a run.
+    """Returns a table with the unit and the meaning of each column of a run.
 
     Args:
-        of: A run, or names of columns. With None, the result contains all columns that
-            exist, with ``{k}`` instead of numbers.
+        of: A run, or names of columns. None means all columns that any run can have.
+            Their names then have ``{k}`` instead of numbers.
 
     Returns:
         Table with one row per column. The index is the name of the column, and the

@@ -34,7 +34,8 @@ class GuardedMotion:
     """(n, 3) poses (x, y, theta) at which the robot would come to rest if it braked
     from each tick on. The poses are in the frame of the odometry, m and rad."""
     keep_m: float
-    """Radius of a disc about the axle, m. The guard keeps this disc in free space."""
+    """Radius of a disc around the origin of B, m. The guard keeps this disc in free
+    space."""
 
 
 def guarded_motion(result: RunResult) -> GuardedMotion | None:
@@ -66,13 +67,12 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
 
 @dataclass(frozen=True)
 class Halt:
-    """A halt of the robot by its guard because of one fault of the sensing."""
+    """Halts of the robot by its guard because of one fault of one sensor."""
 
     fault: str
     """Name of the fault, from ``SENSING_FAULTS``."""
     sensor: int
-    """Number of the faulty range sensor. The sensors are numbered from 1, starting at
-    the left. 0 is the odometry."""
+    """Number of the faulty range sensor, from 1 at the left; 0 for the odometry."""
     start_s: float
     """Time at which the guard first found the fault, s."""
     duration_s: float
@@ -86,7 +86,8 @@ class Halt:
 def halts_of(result: RunResult) -> list[Halt]:
     """Lists the sensing faults for which the safety guard halted the robot of a run.
 
-    Each fault of each sensor is one halt. The halts are sorted by start time.
+    The list has one entry for each fault of each sensor, even if the fault occurred
+    several times. The entries are sorted by start time.
     """
     columns, found = result.columns, []
     if "sensing_fault" not in columns:
@@ -108,10 +109,10 @@ def _resting_poses(
     commands: NDArray[np.float64],
     numbers: BrakingNumbers,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the (n, 3) poses at which the robot would rest if it braked at a tick.
+    """Computes for each tick the pose at which the robot would rest if it braked.
 
-    Poses are (x, y, theta), m and rad. The (n, 2) commands are the speeds of the left
-    and right wheel that the previous tick commanded, rad/s.
+    The poses (n, 3) are (x, y, theta), m and rad. The (n, 2) commands are the speeds of
+    the left and right wheel that the previous tick commanded, rad/s.
     """
     rests = np.empty(poses.shape)
     speeds, kept = (0.0, 0.0), numbers.part.kept**numbers.parts

@@ -20,7 +20,7 @@ from systems.safety.free_space_map import FreeSpaceMap
 
 #: Columns of the pose by odometry, which the reconstruction of the map needs.
 _POSE = ("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated")
-#: Columns of the wheel speeds, which the reconstruction of the map needs, too.
+#: Columns of the wheel speeds, which the reconstruction also needs.
 _WHEELS = ("wheel_speed_left", "wheel_speed_right")
 #: Parts of the robot that must be blocks of this project. For a block of a user's own,
 #: the ages of readings or the rules of the map are unknown.
@@ -57,7 +57,7 @@ class KnownSpace:
         return x, x + wide * self.cell_m, y, y + deep * self.cell_m
 
     def middles(self, cells: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Returns the (m, 2) centers of the m cells that a mask (i, j) selects, m."""
+        """Returns the (k, 2) centers of the k cells where a mask (i, j) is true, m."""
         counted = np.argwhere(cells).astype(np.float64)
         return np.array(self.corner_m) + (counted + 0.5) * np.float64(self.cell_m)
 
@@ -65,8 +65,9 @@ class KnownSpace:
 def has_known_space(result: RunResult) -> bool:
     """Returns whether the log of a run is sufficient to reconstruct the robot's map.
 
-    Three conditions must hold. The joint result of several robots never fulfills them.
+    These conditions must hold:
 
+    - The result is that of one robot, not the joint result of several robots.
     - The robot has a safety guard, which uses a map of free floor.
     - The blocks of the range sensors and of the map are not a user's own blocks.
     - The log contains the poses, the wheel speeds and the sensor readings.
@@ -87,9 +88,9 @@ def has_known_space(result: RunResult) -> bool:
 def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
     """Reconstructs the map of free floor at each tick (control period) of a run.
 
-    The function feeds the log to the step of the block ``FreeSpaceMap``. Every tick
-    yields the same object, which changes at the next tick. Copy all values that you
-    need later.
+    The function runs the step of the block ``FreeSpaceMap`` on the logged readings. It
+    yields the same object at every tick and changes this object at the next tick. Copy
+    all values that you need later.
     """
     scenario, tick_s = result.scenario, result.scenario.tick_s
     sensors = scenario.sensing.ultrasonic
@@ -129,8 +130,8 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
     scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
     sensors = scenario.sensing.ultrasonic
     ticks = np.rint(result.time / tick_s).astype(np.int64)
-    # The log does not contain the sensor that has just fired. The schedule of the
-    # sensors determines the ages of their readings.
+    # The log does not state which sensor has just fired. But the sensors fire on a
+    # schedule, which determines the ages of their readings.
     since = (ticks[:, None] - sensors.turns(tick_s)) % sensors.round_ticks(tick_s)
     ranges, echo, poses, wheels = (
         np.column_stack([columns[name] for name in names])
@@ -150,11 +151,12 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
 
 
 def known_space(result: RunResult, times: ArrayLike) -> KnownSpace | None:
-    """Reconstructs what a robot with a safety guard knew of the floor at times in s.
+    """Reconstructs the map of the floor that a robot had at the given times, s.
 
-    For each time, the function uses the nearest tick (control period). It uses no tick
-    twice. The grid contains all cells that were known at any of these ticks. The value
-    is None if ``has_known_space`` is False.
+    For each time, the function uses the nearest tick (control period). A tick that is
+    nearest to several times occurs once in the result. The grid contains all cells that
+    were known at any of these ticks. The result is None if ``has_known_space`` is
+    false.
     """
     if not has_known_space(result):
         return None
@@ -179,7 +181,7 @@ _View = tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.float64]]
 
 
 def _view(space: FreeSpace) -> _View:
-    """Copies the known part of a map, with the cells in spatial order."""
+    """Copies the known part of a map, and sorts its cells by their position."""
     cells = len(space.free_until)
     first = space.first.copy()
     at = np.ix_(*((first[:, None] + np.arange(cells)) % cells))

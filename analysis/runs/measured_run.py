@@ -1,4 +1,4 @@
-"""Quantities of one robot over a run, from which its metrics are computed."""
+"""Quantities of a run of one robot, from which the metrics are computed."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ Flags = NDArray[np.bool_]
 
 #: Length of the windows over which the smoothness of the motion is computed, s.
 WINDOW_S = 4.0
-#: If the robot is always slower than this in a window, the window counts as rest, m/s.
+#: A window in which the robot is always slower than this speed counts as rest, m/s.
 MOVING_M_S = 0.05
 #: Limits of an encounter with an obstacle. ``MET_M``: greatest clearance during the
-#: encounter, m (the distance S of Engelbrecht 2021). ``AFTER_S``: time after the
-#: encounter that still counts, s.
+#: encounter, m (the distance S of Engelbrecht 2021). ``AFTER_S``: the encounter still
+#: lasts for this time after the clearance has become greater, s.
 MET_M, AFTER_S = 1.0, 5.0
-#: Length of the moving mean of the yaw rate, s. Slower changes count as turns, not as
-#: ripple.
+#: Length of the moving mean of the yaw rate, s. The moving mean contains the intended
+#: turns, and the rest is ripple.
 MEAN_S = 1.0
 #: An echo belongs to a body if the range reading differs from the true range of this
 #: body by at most this distance, m.
@@ -82,7 +82,11 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def begin(self) -> int:
-        """First tick that counts: when a search that waits for a call first hears."""
+        """First tick that counts for the metrics of a search.
+
+        If the robot waits for a call, this is the first tick at which it listens to the
+        sound of the caller. Otherwise, it is 0.
+        """
         if not self.searches:
             return 0
         return int((self.columns.get("listening", np.zeros(1)) > 1.5).argmax())
@@ -98,32 +102,33 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def path_length(self) -> float:
-        """Length of the path of the origin of B, until a search ends, m."""
+        """Length of the path of B's origin up to the tick ``end``, m."""
         path = self.result.vector("p_WB")[:, : self.end + 1]
         return float(np.sum(lengths(np.diff(path))))
 
     @cached_property
     def source_distance(self) -> Floats:
-        """(n,) distance from P, or from B's origin for a search, to the source, m."""
+        """(n,) distance to the source from P, but in a search from B's origin, m."""
         if not self.searches:
             return self.columns["source_range_true"]
         return lengths(self.result.vector("p_WB") - self.result.poses("WS")[:, :2].T)
 
     @cached_property
     def search_steps(self) -> float:
-        """Number of moves that a search began."""
+        """Number of moves that the robot began in its search."""
         return float(self.columns["search_steps"][self.end])
 
     @cached_property
     def in_goal(self) -> Flags:
-        """(n,) whether P is in the goal."""
+        """(n,) whether P is in the goal, a circle around the source."""
         return self.columns["source_range_true"] <= self.result.goal_radius_m
 
     @cached_property
     def settling_time(self) -> float | None:
-        """Time after which P stays in the goal, s.
+        """Time after which P stays in the goal until the run ends, s.
 
-        If the source is at rest, P also has to stay at rest.
+        If the source is at rest, P must also stay at rest, for at least
+        ``stop.rest_time_s``. The value is None if there is no such time.
         """
         settled, least = self.in_goal, 0.0
         if not self.result.target_moves:
@@ -139,9 +144,9 @@ class MeasuredRun(Proximity):
     def shortest_path(self) -> float | None:
         """Length of the shortest path from the start to the goal, m.
 
-        The path is that of a disc as wide as the robot. It ends at the first point from
-        which the control point P can reach into the goal. The value is None if the
-        source moves, or if there is no path.
+        The path is that of a disc as wide as the robot. It ends where the control point
+        P can reach the edge of the goal. The value is None if the source moves, or if
+        there is no path.
         """
         result, robot = self.result, self.result.scenario.only
         if result.target_moves:
@@ -174,7 +179,7 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def after_second_burst(self) -> Flags:
-        """(n,) whether the second burst of the source is over."""
+        """(n,) whether the second burst of sound from the source is over."""
         sound = self.result.scenario.source.sound
         return self.time >= sound.start_s + sound.period_s + sound.on_s
 
@@ -193,7 +198,7 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def in_encounter(self) -> Flags:
-        """(n,) whether the robot meets a body; see ``near_and_after``."""
+        """(n,) whether the robot meets a body, as defined by ``near_and_after``."""
         if not len(self.bodies):
             return np.zeros(len(self.time), dtype=bool)
         return near_and_after(self.clearance, self.tick_s)
@@ -207,12 +212,15 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def jerk(self) -> Floats:
-        """Magnitude of the jerk of B's origin, m/s^3."""
+        """(m,) magnitude of the jerk of B's origin, m/s^3, m < n; see ``jerk``."""
         return lengths(jerk(self.result.vector("v_WB").T, self.tick_s).T)
 
     @cached_property
     def movements(self) -> Floats:
-        """(k, m) speeds in the k windows of 4 s in which the robot moves, m/s."""
+        """(k, m) speeds in the k windows of 4 s in which the robot moves, m/s.
+
+        A window with constant acceleration is left out, because it has no jerk.
+        """
         parts = windows(self.speed, round(WINDOW_S / self.tick_s))
         moving = np.max(parts, axis=1, initial=0.0) >= MOVING_M_S
         return parts[moving & np.any(np.diff(parts, 2) != 0.0, axis=1)]
@@ -224,10 +232,11 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def echo_times(self) -> tuple[float | None, float | None]:
-        """Times from the first and from the last echo of the touched body to contact.
+        """Times from the first echo and from the last echo to the collision, s.
 
-        The times are in s. Both are None if the run had no collision, or if the body
-        never caused an echo. The robot must have range sensors.
+        Only echoes of the body that the robot hits count. Both times are None if the
+        run had no collision, or if this body never caused an echo. The robot must have
+        range sensors.
         """
         hit = self.result.collision
         if hit is None:
@@ -239,7 +248,7 @@ class MeasuredRun(Proximity):
         return first, last
 
     def _echoes(self, name: str) -> Flags:
-        """(n,) whether any sensor had an echo of the named body, at each tick."""
+        """(n,) whether any sensor had an echo of the body with this name."""
         scenario = self.result.scenario
         sensors = scenario.sensing.ultrasonic
         bodies = self.result.surroundings.bodies[name].rectangles(self.time)
@@ -252,7 +261,7 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def odometry_error(self) -> Floats:
-        """(n,) distance between the true position and that by odometry, m."""
+        """(n,) distance from the true position to that by odometry, m."""
         return lengths(
             self.result.vector("p_WB_estimated") - self.result.vector("p_WB")
         )
@@ -263,36 +272,37 @@ class MeasuredRun(Proximity):
     def frames_with_sound(self) -> Flags:
         """(n,) whether an audio frame with sound ends at each tick.
 
-        A frame has sound if the source sounds during at least half of the frame. Only
-        the schedule of the source counts. Therefore a pause within a recording counts
-        as sound. The travel time of the sound is included, except with ideal hearing.
+        A frame has sound if the schedule of the source states that the source sounds in
+        the middle of the frame. Therefore a pause within a recording counts as sound.
+        With the hearing ``audio``, the travel time of the sound is included. With the
+        hearing ``ideal_always``, every frame has sound.
         """
         return self._new_frames & self._sounding
 
     @cached_property
     def detections(self) -> Flags:
-        """(n,) whether an audio frame ends in which the robot detected the source."""
+        """(n,) whether an audio frame ends, and the robot detected the source in it."""
         return self._new_frames & (self.columns["detected"] > 0.5)
 
     @cached_property
     def ranged_detections(self) -> Flags:
-        """(n,) whether such a detection includes a range."""
+        """(n,) whether there is a detection that includes a range."""
         return self.detections & (self.columns["range_valid"] > 0.5)
 
     @cached_property
     def source_errors(self) -> Floats:
         """Position error of each detection that includes a range, m."""
         away = self.result.vector("p_WS_estimated") - self.result.vector("p_WS")
-        # The target uses an estimate from the next tick on.
+        # The column ``p_WS_estimated`` contains a detection from the next tick on.
         return lengths(away[:, 1:][:, self.ranged_detections[:-1]])
 
     @cached_property
     def _sounding(self) -> Flags:
-        """(n,) whether at least half of the last audio frame has sound."""
+        """(n,) whether the source sounds in the middle of a frame that ends now."""
         scenario = self.result.scenario
         travel = np.zeros(len(self.time))
         if scenario.follower.hearing == "audio":
-            # The distance is that at the end of the frame: half a frame too late.
+            # The distance at the end of the frame stands for that in the middle.
             travel = self.columns["source_range_true"] / scenario.sound_speed_m_s
         elif scenario.follower.hearing == "ideal_always":
             return np.ones(len(self.time), dtype=bool)
@@ -317,7 +327,7 @@ def _cone_ranges(
     half_angles: Floats,
     control_point_m: float,
 ) -> Floats:  # pragma: no cover  (compiled)
-    """(n, sensors) true ranges of one moving rectangle, m; see ``fan_ranges``."""
+    """(n, sensors) true ranges to one moving rectangle, m; see ``fan_ranges``."""
     ranges = np.empty((len(poses), axes.size))
     for i in range(len(poses)):
         ranges[i] = fan_ranges(
@@ -327,9 +337,10 @@ def _cone_ranges(
 
 
 def near_and_after(clearance: ArrayLike, period_s: float) -> Flags:
-    """(n,) whether an obstacle is nearer than 1 m, or was nearer within the last 5 s.
+    """(n,) whether an obstacle is nearer than 1 m, or has been within the last 5 s.
 
-    The (n,) clearances from the nearest obstacle are in m.
+    The argument ``clearance`` (n,) is that of the nearest obstacle, m. The samples
+    have intervals of ``period_s``, s.
     """
     near = np.asarray(clearance, dtype=float) < MET_M
     ticks = np.arange(len(near))
@@ -340,8 +351,9 @@ def near_and_after(clearance: ArrayLike, period_s: float) -> Flags:
 def yaw_ripple(rate: ArrayLike, where: Flags, period_s: float) -> float | None:
     """Computes the RMS value of a yaw rate (n,) minus its moving mean over 1 s.
 
-    The flags ``where`` (n,) select the samples that count. The value has the unit of
-    the rate. It is None if no sample counts.
+    The moving mean includes all samples. The RMS value includes only the samples for
+    which ``where`` (n,) is true. The result has the unit of the rate. It is None if
+    ``where`` is never true.
     """
     if not np.any(where):
         return None
@@ -352,24 +364,24 @@ def yaw_ripple(rate: ArrayLike, where: Flags, period_s: float) -> float | None:
 
 
 def lengths(vectors: Iterable[Floats]) -> Floats:
-    """(n,) lengths of vectors. The function ``numpy.hypot`` is three times slower."""
+    """(n,) lengths of n vectors (2, n), three times faster than ``numpy.hypot``."""
     x, y = vectors
     found: Floats = np.sqrt(x * x + y * y)
     return found
 
 
 def share(flags: Flags) -> float | None:
-    """Share of the true flags, from 0 to 1; None without flags."""
+    """Returns the share of flags that are true, 0 to 1; None if there are no flags."""
     return int(np.count_nonzero(flags)) / len(flags) if len(flags) else None
 
 
 def rms(values: Floats) -> float | None:
-    """Root of the mean square; None without values."""
+    """Returns the root mean square; None if there are no values."""
     return math.sqrt(values @ values / len(values)) if len(values) else None
 
 
 def quantile(values: Floats, q: float) -> float | None:
-    """Returns a quantile, interpolated as by ``numpy.quantile``, but much faster."""
+    """Returns the quantile q of values, like ``numpy.quantile``, but much faster."""
     if not len(values):
         return None
     place = q * (len(values) - 1)

@@ -1,8 +1,8 @@
 """The metrics of a run: one record per metric, and the functions that compute them.
 
-Everything else reads this table: the summary of a run, sweeps, comparisons, their
-pages, docs/metrics.md and ``phonotaxis columns --metrics``. To add a metric, add its
-record to a group.
+The summary of a run, sweeps, comparisons, their pages, docs/metrics.md and the command
+``phonotaxis columns --metrics`` read the metrics from this file. To add a metric, add
+its record to a group in ``GROUPS``.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ from systems.world.geometry import beyond_rectangle
 OUTLIER_M = 0.5
 #: Least turn rate that counts as turning, rad/s.
 TURNING_RAD_S = 0.1
-#: Least push that counts as a reaction of the law, N. It accelerates 3.94 kg by
-#: 0.13 m/s^2.
+#: Least push that counts as a reaction of the law, N. A push is a force away from
+#: obstacles. This one accelerates a virtual mass of 3.94 kg by 0.13 m/s^2.
 REACTION_N = 0.5
 #: An echo belongs to an obstacle if its distance differs from the true distance of this
 #: obstacle by at most this value, m.
 ECHO_M = 0.2
 #: Least speed that counts as driving in a search, m/s.
 DRIVING_M_S = 0.02
-#: Part of the top speed from which on a speed counts as saturated.
+#: A speed of at least this part of the top speed counts as saturated.
 FULL = 0.999
 #: Sum of the arm lengths of two robots, m: of the listening robot and of the calling
 #: robot (Song 2011, 2.1, 3.1). At a smaller distance, the arms can touch.
@@ -56,7 +56,7 @@ ARMS_M = 0.15 + 0.20
 
 @dataclass(frozen=True)
 class Metric:
-    """A number that describes a run, and how numbers of many runs are averaged."""
+    """Definition of a number that describes a run, and of its average over runs."""
 
     name: str
     """Name in JSON documents and in the tables of sweeps."""
@@ -69,16 +69,17 @@ class Metric:
     value: Callable[[MeasuredRun], float | None]
     """Computes the metric of a run. The value is None if the metric does not apply."""
     of: Literal["ended", "successes"] = "ended"
-    """Runs that an average includes: all runs that came to an end, or successful runs.
-    An early end of a run would change the values of the latter kind."""
+    """Runs that an average includes: all runs that ended without an error, or only the
+    successful ones. The latter is for metrics that an early end of a run changes."""
     average: Literal["median", "mean"] = "median"
     """Average over runs."""
     robots: Literal["mean", "least", "greatest"] = "mean"
-    """How the values of several robots become one value of their run."""
+    """How the values of several robots are combined into one value of the run."""
     digits: int = 3
     """Number of decimals in tables."""
     paired: bool = False
-    """Whether comparisons evaluate its differences between paired runs."""
+    """Whether comparisons evaluate the difference of the metric between two runs on the
+    same layout."""
     shown: Literal["", "table", "picture"] = ""
     """Whether the pages of sweeps and comparisons show the metric: not at all, in
     tables, or in tables and pictures."""
@@ -96,7 +97,7 @@ class Metric:
 
 
 class Group(NamedTuple):
-    """Metrics that the same runs have."""
+    """Metrics that apply to the same runs."""
 
     name: str
     applies: Callable[[MeasuredRun], bool]
@@ -126,7 +127,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def metric_label(name: str) -> str:
-    """Title and unit of a metric, whose name may begin with the name of a robot."""
+    """Returns title and unit of a metric; its name may begin with a robot's name."""
     robot, _, own = name.rpartition(".")
     label = METRICS[own].label if own in METRICS else own.replace("_", " ")
     return f"{robot}: {label}" if robot else label
@@ -188,7 +189,8 @@ def _control_effort(run: MeasuredRun) -> float | None:
 def _push_work(run: MeasuredRun) -> float | None:
     if not run.has("repulsion_x"):
         return None
-    # The push at a tick changes the velocity of the previous row to that of this row.
+    # The previous row contains the velocity before the push, and this row that after
+    # it.
     after = run.result.vector("v_WP")
     before = np.column_stack([np.zeros(2), after[:, :-1]])
     repulsion = run.result.vector("repulsion")
@@ -272,8 +274,9 @@ def _first_reaction(
     - A collision vector agrees with this obstacle: its length differs from the distance
       of the obstacle by at most ``ECHO_M``.
 
-    The ``echoes`` (k, 3, n) hold k collision vectors, which point from P to an echo: a
-    number above 0 if there is a vector, and its x and y in the robot frame B, m.
+    The argument ``echoes`` (k, 3, n) contains k collision vectors, which point from P
+    to an echo. Each has a number above 0 if the vector exists, and then its x and y in
+    the robot frame B, m.
     """
     for i in range(push.shape[1]):
         if math.hypot(push[0, i], push[1, i]) < REACTION_N:

@@ -16,7 +16,7 @@ from systems.world.geometry import contact_time, rectangle_clearance
 
 Floats = NDArray[np.float64]
 
-#: Clearance below which the clearances between two ticks are computed, too, m.
+#: Clearance below which clearances are also computed between two ticks, m.
 NEAR_M = 0.1
 #: Number of parts into which the time between two ticks is then divided.
 PARTS = 10
@@ -26,8 +26,8 @@ PARTS = 10
 class Proximity:
     """Distances between the rectangle of a robot and all bodies that it can hit.
 
-    The rectangle is the real outline of the robot, not an enclosing disc. If the target
-    of the robot is a body, it is the last body.
+    The rectangle is the real outline of the robot, not an enclosing disc. A tick is a
+    control period.
     """
 
     result: RunResult
@@ -39,9 +39,9 @@ class Proximity:
 
     @cached_property
     def bodies(self) -> Floats:
-        """(m, n, 5) rectangles of m bodies at n ticks (control periods).
+        """(m, n, 5) rectangles of m bodies at n ticks.
 
-        If the target of the robot is a body, it is the last body.
+        The target of the robot comes last. A target without a body is not included.
         """
         around, time = self.result.surroundings, self.result.time
         bodies = [body.rectangles(time) for body in around.obstacles.values()]
@@ -59,17 +59,16 @@ class Proximity:
     def least(self) -> Floats:
         """(m,) least clearance from each body, including the time between ticks, m.
 
-        A tick is a control period of 25 ms by default. A body can pass the robot
-        between two ticks. Therefore the time between two ticks is divided into ten
-        parts if one of two conditions holds:
+        A body can pass the robot between two ticks. Therefore the time between two
+        ticks is divided into ten parts if one of two conditions holds:
 
         - At one of the two ticks, the clearance from the nearest body is below
           ``NEAR_M``.
         - Between the two ticks, the robot and the fastest body together move farther
           than the clearance at one of these ticks.
 
-        Within these parts, the poses of all robots are interpolated. The other bodies
-        are at the exact poses of their paths.
+        At the additional times, the poses of robots are interpolated. The other bodies
+        have the exact poses of their paths.
         """
         clearance, least = self._clearances
         gone = np.hypot(*np.diff(self.robot[:, :2], axis=0).T)
@@ -96,8 +95,9 @@ class Proximity:
     def least_time_to_contact(self) -> float:
         """Least predicted time to a contact, over all ticks (control periods), s.
 
-        The prediction at a tick assumes that no body turns, and that the center of each
-        body keeps its velocity. The value is infinite if no contact is ever predicted.
+        The prediction at a tick assumes that the robot and the bodies do not turn, and
+        that their centers keep their velocities. The value is infinite if no contact is
+        ever predicted.
         """
         if len(self.result.time) < 2:
             return math.inf
@@ -128,7 +128,7 @@ def least_clearances(
     reaches = _reaches(robot, bodies)
     first = 0
     for i in range(ticks):
-        # The body that was nearest at the last tick comes first. Then the function can
+        # The loop begins with the body that was nearest at the last tick. It can then
         # skip more of the other bodies.
         begin = first
         for j in range(count):
@@ -160,8 +160,8 @@ def _least_contact_time(
             vy = velocity[1, i] - _rate(time, y, i)
             apart = _gap(robot[i], bodies[k, i], reaches[k])
             if apart > 0.0:
-                # If there is a contact, the circles touch first. Their gap closes at
-                # most as fast as their centers now approach each other.
+                # Before a contact, the enclosing circles touch. The gap between them
+                # closes at most as fast as their centers now approach each other.
                 dx, dy = x[i] - robot[i, 0], y[i] - robot[i, 1]
                 nearing = (dx * vx + dy * vy) / (apart + reaches[k])
                 if nearing <= 0.0 or apart >= least * nearing:
@@ -172,7 +172,7 @@ def _least_contact_time(
 
 @njit(cache=True)
 def _reaches(robot: Floats, bodies: Floats) -> Floats:  # pragma: no cover  (compiled)
-    """(m,) radius of the circle around the robot plus that around each body, m."""
+    """(m,) radius of the robot's enclosing circle plus that of each body's, m."""
     reaches = np.empty(len(bodies))
     for k in range(len(bodies)):
         a, b = robot[0], bodies[k, 0]
@@ -182,7 +182,7 @@ def _reaches(robot: Floats, bodies: Floats) -> Floats:  # pragma: no cover  (com
 
 @njit(cache=True)
 def _gap(a: Floats, b: Floats, reach: float) -> float:  # pragma: no cover  (compiled)
-    """Gap between the circles around two rectangles, m; negative if they overlap."""
+    """Gap between the enclosing circles of two rectangles, m; negative in overlap."""
     dx, dy = a[0] - b[0], a[1] - b[1]
     return math.sqrt(dx * dx + dy * dy) - reach
 

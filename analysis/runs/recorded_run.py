@@ -1,4 +1,4 @@
-"""Loads the scenario and the table of a run, for example from its directory."""
+"""A finished run as its scenario and its table, for example loaded from files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NEEDED = (
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """A run as its scenario and its table, for the export to other programs."""
+    """Scenario and table of a finished run, for the export to other programs."""
 
     scenario: Scenario
     """The whole scenario, with all robots."""
@@ -72,8 +72,8 @@ class RecordedRun:
     def robots(self) -> dict[str, Mapping[str, NDArray[np.float64]]]:
         """Columns of each robot, by name of the robot.
 
-        Each column is an (n,) array, by name of the column. These names do not contain
-        the name of the robot.
+        Each value is a mapping from names of columns to (n,) arrays. The names do not
+        begin with the name of the robot.
         """
         names = list(self.scenario.robots)
         columns = {

@@ -15,9 +15,9 @@ from systems.search.search_ending import fault_names
 
 
 def run_document(result: RunResult) -> dict[str, Any]:
-    """Returns the summary of a run as a JSON document, from plain values.
+    """Returns the summary of a run as a JSON document.
 
-    The key ``out`` is None until the files of the run have a directory.
+    The key ``out``, the directory of the run, is None. The caller sets it later.
     """
     document = {
         "schema_version": SCHEMA_VERSION,
@@ -71,7 +71,8 @@ def run_text(result: RunResult, summary: dict[str, Any]) -> str:
 def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
     """Returns the rows of a run's summary for the terminal, by name of the row.
 
-    With several robots, the names of a robot's rows begin with its name and a dot.
+    If there are several robots, the names of the rows about one robot begin with the
+    name of this robot and a dot.
     """
     timing = summary["timing"]
     scenario = result.full_scenario
@@ -99,7 +100,7 @@ def _ended(result: RunResult) -> str:
 def _robot_rows(
     result: RunResult, metrics: dict[str, Any], prefix: str
 ) -> dict[str, str]:
-    """Returns the rows of one robot; their names and metrics begin with the prefix."""
+    """Returns the rows of one robot; ``prefix`` precedes names of rows and metrics."""
     robot, stop = result.scenario.only, result.scenario.stop
 
     def text(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Computes the shortest path of a disc around boxes, as a reference for real paths."""
+"""Computes the shortest path of a disc around boxes, to compare driven paths."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from systems.world.geometry import beyond_rectangle, segment_clearance
 
 Floats = NDArray[np.float64]
 
-#: Number of tangents that replace a quarter circle around a corner. Their total length
-#: is 0.6 % longer than the arc.
+#: Number of tangents that replace a quarter circle around a corner. Together, they are
+#: 0.6 % longer than the quarter circle.
 TANGENTS = 6
 #: Depth to which a path may cut into a grown box, m. A path lies on the outline of the
 #: box, so rounding errors can put it slightly inside.
@@ -30,10 +30,12 @@ def shortest_path_length(
     """Computes the length of the shortest path of a disc to a circle around the goal.
 
     Lengths are in m. The boxes (n, 5) are rectangles (x, y, theta, length, width) at
-    rest, m and rad. The function grows them by the radius of the disc. Then it runs A*
-    on their visibility graph, whose edges connect points on the outlines of the grown
-    boxes. The last leg of a path runs straight toward the goal. Polygons just outside
-    the arcs replace the rounded corners.
+    rest, m and rad. The path is that of the center of the disc, and ends on the circle.
+
+    The function grows the boxes by the radius of the disc. Polygons just outside of the
+    grown boxes replace their rounded corners. The function then runs A* on the
+    visibility graph of the corners of these polygons. The last leg of a path runs
+    straight toward the goal.
 
     If the disc overlaps a box at the start, this box grows only up to the center of the
     disc. The length is 0 if the start is inside the circle, and infinite if there is no
@@ -48,7 +50,7 @@ def shortest_path_length(
 def _search(
     start: Floats, goal: Floats, goal_radius: float, boxes: Floats, radius: float
 ) -> float:  # pragma: no cover  (compiled)
-    """Runs A* from the start, with the straight distance to the circle as heuristic."""
+    """Runs A* from the start. The heuristic is the straight distance to the circle."""
     radii = np.array([min(radius, _beyond(start, box)) for box in boxes])
     points = np.empty((1 + 4 * TANGENTS * len(boxes), 2))
     points[0] = start
@@ -99,7 +101,7 @@ def _beyond(point: Floats, box: Floats) -> float:  # pragma: no cover  (compiled
 def _outline(
     box: Floats, radius: float, corners: Floats
 ) -> None:  # pragma: no cover  (compiled)
-    """Computes the corners of a polygon just outside a box grown by a radius."""
+    """Computes the corners of a polygon just outside of a box that grew by a radius."""
     step = 0.5 * math.pi / TANGENTS
     arc = radius / math.cos(0.5 * step)
     c, s = math.cos(box[2]), math.sin(box[2])
@@ -115,7 +117,7 @@ def _outline(
 def _free(
     start: Floats, end: Floats, boxes: Floats, radii: Floats
 ) -> bool:  # pragma: no cover  (compiled)
-    """Whether a straight leg keeps the required distance from each box."""
+    """Whether a straight leg keeps the distance ``radii`` (n,) from the n boxes."""
     for k in range(len(boxes)):
         if segment_clearance(start, end, boxes[k]) < radii[k] - GRAZE_M:
             return False

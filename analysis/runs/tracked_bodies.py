@@ -1,4 +1,4 @@
-"""Reconstructs which bodies a robot took as moving, from the log of a run."""
+"""Reconstructs from the log of a run which bodies a robot took as moving."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from systems.planning.hazards import Hazards, make_hazards, track_hazards
 
 @dataclass(frozen=True)
 class TrackedBodies:
-    """A robot's tracks of moving bodies at several times.
+    """The moving bodies that a robot tracked, at several times.
+
+    The robot has one track per body. A track consists of particles: possible positions
+    and velocities of the body.
 
     All positions are in the frame of the odometry. At the start, this frame equals the
     world frame W. During the run, it drifts away from W.
@@ -35,11 +38,12 @@ class TrackedBodies:
 
 
 def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
-    """Reconstructs the bodies that a robot with the guarded law tracked at times in s.
+    """Reconstructs the moving bodies that a robot tracked at the given times, s.
 
-    The guarded law is a control law that plans around moving bodies. For each time, the
-    function uses the nearest tick (control period). It uses no tick twice. The value is
-    None for any other law, and if ``has_known_space`` is False.
+    For each time, the function uses the nearest tick (control period). A tick that is
+    nearest to several times occurs once in the result. The result is None unless the
+    law is ``guarded``, which plans around moving bodies. The result is also None if
+    ``has_known_space`` is false.
     """
     scenario, columns = result.scenario, result.columns
     if scenario.only.law != "guarded" or not has_known_space(result):

@@ -1,1 +1,1 @@
-"""Tries to make a guarded robot collide."""
+"""Searches for runs in which a robot with a guard collides."""

@@ -1,4 +1,9 @@
-"""Layouts and drivers that try to make a guarded robot touch obstacles at rest."""
+"""Trials in which a driver tries to make a robot with a guard touch obstacles at rest.
+
+A driver is a law or another program that commands the robot. A layout is a random
+arrangement of obstacles. A setting, also called a variant, is a set of changes of the
+robot's parameters.
+"""
 
 from __future__ import annotations
 
@@ -20,22 +25,23 @@ from systems.world.geometry import beyond_rectangle, rectangle_clearance
 
 #: Duration of a run, s.
 DURATION_S = 10.0
-#: Number of bodies in every layout. Bodies that a layout does not need are far away.
+#: Number of obstacles in every trial. Obstacles that a layout does not need are far
+#: away.
 _BODIES = 6
-#: Modes of a row of a driver's table.
+#: Modes of a row of a driver's table; see ``Row.mode``.
 TWIST, AHEAD, BACK, AIM = range(4)
 
 
 class Row(NamedTuple):
     """A row of a driver's table: the driver's command until a given time.
 
-    The command is the sum of two parts: that of the mode, and a swing. The forward
-    speed swings with ``swing_v * wave(rate * t)``. The yaw rate swings with
-    ``swing_omega * wave(rate * t + phase)``.
+    The command is the sum of the command of the mode and a swing. The swing of the
+    forward speed is ``swing_v * wave(rate * t)``. The swing of the yaw rate is
+    ``swing_omega * wave(rate * t + phase)``. The time t is that of the run.
     """
 
     end_s: float
-    """End of the row, s. ``make_trial`` converts the time to control periods."""
+    """Time at which the row ends, s. ``make_trial`` converts it to control periods."""
     mode: float = TWIST
     """Mode of the driver.
 
@@ -45,23 +51,24 @@ class Row(NamedTuple):
     - ``AIM``: Turn in place until the goal is at the bearing ``omega``.
     """
     v: float = 0.0
-    """Forward speed, m/s."""
+    """Forward speed, m/s. In the mode ``BACK``: speed backward, m/s."""
     omega: float = 0.0
     """Yaw rate, rad/s. In the mode ``AIM``: a bearing, rad."""
     x: float = 0.0
-    """x of the goal, m."""
+    """x of the goal in W, m."""
     y: float = 0.0
-    """y of the goal, m."""
+    """y of the goal in W, m."""
     by_truth: float = 0.0
     """1: the driver steers by the true pose. 0: the driver steers by the odometry."""
     swing_v: float = 0.0
-    """Amplitude of the forward speed, m/s."""
+    """Amplitude of the swing of the forward speed, m/s."""
     swing_omega: float = 0.0
-    """Amplitude of the yaw rate, rad/s."""
+    """Amplitude of the swing of the yaw rate, rad/s."""
     rate: float = 0.0
-    """Angular frequency, rad/s. ``make_trial`` converts it to rad per tick."""
+    """Angular frequency of the swing, rad/s. ``make_trial`` converts it to rad per
+    control period."""
     phase: float = 0.0
-    """Phase by which the yaw rate leads the forward speed, rad."""
+    """Phase by which the swing of the yaw rate leads that of the forward speed, rad."""
     edge: float = 1.0
     """Shape of the swing: argument ``edge`` of ``wave``."""
     skew: float = 0.0
@@ -69,24 +76,25 @@ class Row(NamedTuple):
 
 
 _FIELDS = len(Row._fields)
-#: The table of the next run.
+#: Table of the driver in the next run. ``run_result`` sets it, because a scenario can
+#: name the block ``Driver`` but cannot pass a table to it.
 _NEXT: list[NDArray[np.float64]] = [np.array(Row(0.0))]
 
 
 @register_jitable
 def wave(angle: float, edge: float, skew: float) -> float:
-    """Computes a periodic function between -1 and 1 of a phase angle in rad.
+    """Returns a periodic function of a phase angle in rad, with values from -1 to 1.
 
-    With an ``edge`` of 1 and a ``skew`` of 0, the function is a sine. ``edge`` is the
-    gain before the value is limited to [-1, 1]. A large gain makes a square wave. A
-    ``skew`` near 1 or -1 makes a sawtooth.
+    With an ``edge`` of 1 and a ``skew`` of 0, the function is a sine. ``edge`` is a
+    gain, after which the value is limited to [-1, 1]. A large gain makes a square wave.
+    A ``skew`` near 1 or -1 makes a sawtooth.
     """
     value = edge * math.sin(angle + skew * math.sin(angle))
     return min(max(value, -1.0), 1.0)
 
 
 def drive_step(tick: int, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Executes the rows of a driver's table, one after another."""
+    """Step function of ``Driver``: commands a twist by the present row of the table."""
     (believed, true), (twist,), (table,) = inputs, outputs, numbers
     row = 0
     while row + _FIELDS < len(table) and tick > table[row]:
@@ -109,10 +117,10 @@ def drive_step(tick: int, state: Any, inputs: Any, outputs: Any, numbers: Any) -
 
 
 class Driver(Block):
-    """A block that drives by a table and does not react to obstacles.
+    """A block that commands the robot by a table and does not react to obstacles.
 
-    Unlike a control law, the block may use the true pose. Rows with ``by_truth`` steer
-    by the true pose.
+    The block replaces the control law. Unlike a law, it can use the true pose: rows
+    with ``by_truth`` steer by it.
     """
 
     part = "controller"
@@ -128,33 +136,39 @@ class Driver(Block):
         self.declare(Step(drive_step, (_NEXT[0],)), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
-        """Step function with the table of the run."""
+        """Returns the step function with the table of the run."""
         return Step(drive_step, (_NEXT[0],))
 
 
 class Trial(NamedTuple):
-    """A run that may end in a collision."""
+    """Description of a run in which a driver tries to cause a collision."""
 
     layout: str
+    """Name of the layout."""
     driver: str
+    """Name of the driver or law."""
     variant: str
+    """Name of the setting."""
     fields: dict[str, Any]
     """Fields of the scenario."""
     table: NDArray[np.float64]
-    """Flat table of the driver. If a law drives, the table is not used."""
+    """Table of the driver: the fields of all ``Row`` objects in one array. If a law
+    drives, the table is not used."""
 
 
 class Outcome(NamedTuple):
     """Result of a trial."""
 
     collided: bool
+    """Whether the robot touched an obstacle."""
     clearance_m: float
     """Least clearance of the body, m."""
     disc_m: float
     """Least clearance of the disc about the axle that encloses the body, m."""
 
 
-#: Settings of the robot, by name.
+#: Settings of the robot from which ``draw_trial`` selects, by name. Each setting is a
+#: set of changed fields of the scenario.
 VARIANTS: dict[str, dict[str, Any]] = {
     "plain": {},
     "no noise": {"ultrasonic": {"noise_m": 0.0}},
@@ -180,7 +194,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     },
     "cells of 2 cm": {"guard": {"cell_m": 0.02}},
 }
-#: All settings. Unless ``draw_trial`` gets a setting, it uses only ``VARIANTS``.
+#: All settings. ``draw_trial`` uses those that are not in ``VARIANTS`` only if its
+#: argument ``setting`` names them.
 SETTINGS = {
     **VARIANTS,
     "encoders not rounded": {"plant": {"pulses_per_revolution": None}},
@@ -240,7 +255,10 @@ def _walls(draw: np.random.Generator) -> list[tuple[float, ...]]:
 
 
 def _bubble(draw: np.random.Generator) -> list[tuple[float, ...]]:
-    """Boxes near the edge of the free circle, with corners or faces toward it."""
+    """Boxes near the edge of the start bubble, with corners or faces toward it.
+
+    The start bubble is the circle about the start that the guard assumes to be free.
+    """
     boxes = []
     for angle in draw.uniform(-math.pi, math.pi, _BODIES):
         length, width = draw.uniform(0.02, 0.3, 2)
@@ -257,7 +275,7 @@ def _bubble(draw: np.random.Generator) -> list[tuple[float, ...]]:
 
 
 def _corner(draw: np.random.Generator) -> list[tuple[float, ...]]:
-    """Two walls that meet at a random point and are perpendicular."""
+    """Two perpendicular walls that meet at a random point."""
     angle, far = (
         draw.uniform(-math.pi, math.pi),
         START_BUBBLE_M + draw.uniform(0.05, 0.6),
@@ -281,7 +299,7 @@ LAYOUTS = {
 
 
 def _random(draw: np.random.Generator, boxes: Any, seconds: float) -> list[list[float]]:
-    """Commands that last for random times."""
+    """Random commands of speed and yaw rate that last for random times."""
     rows, end = [], 0.0
     while end < seconds:
         end += draw.exponential(1.5)
@@ -293,7 +311,7 @@ def _random(draw: np.random.Generator, boxes: Any, seconds: float) -> list[list[
 def _pressing(
     draw: np.random.Generator, boxes: Any, seconds: float
 ) -> list[list[float]]:
-    """Drives at a body or near it, forward or backward, for 5 s and longer."""
+    """Drives at a random box or near it, forward or backward, for 5 s to 10 s each."""
     rows, end = [], 0.0
     while end < seconds:
         x, y = boxes[int(draw.integers(len(boxes)))][:2]
@@ -308,7 +326,7 @@ def _pressing(
 def _looking(
     draw: np.random.Generator, boxes: Any, seconds: float
 ) -> list[list[float]]:
-    """Turns first, so that the robot knows its surroundings, and then presses."""
+    """Turns first, so that the sensors see the surroundings, then drives at boxes."""
     turn = draw.choice([-1.0, 1.0]) * draw.uniform(1.0, 3.0)
     rows = [[draw.uniform(1.0, 4.0), TWIST, 0.0, turn, 0.0, 0.0]]
     return [*rows, *_pressing(draw, boxes, seconds)]
@@ -319,10 +337,10 @@ _LAWS = ("active", "conventional")
 
 
 def outside(boxes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
-    """Moves boxes outward until no box overlaps a circle of 1 m about the start.
+    """Moves boxes outward until none overlaps the circle of radius 1 m about the start.
 
-    A box is (x, y, theta, length, width), m and rad. Each moved box is outside the
-    circle by 0.1 mm or more.
+    A box is (x, y, theta, length, width) in W, m and rad. The start is at the origin.
+    Each returned box is at least 0.1 mm outside the circle.
     """
     moved = []
     for x, y, *rest in boxes:
@@ -357,8 +375,10 @@ def make_trial(
     """Makes a trial from boxes and commands.
 
     ``names`` are those of layout, driver and setting. A box is (x, y, theta, length,
-    width), m and rad. ``rows`` have the fields of ``Row``. Without rows, the law with
-    the driver's name drives. The heading at the start is in rad.
+    width) in W, m and rad. ``outside`` moves boxes that are too near to the start.
+    ``rows`` have the first fields of ``Row``, or all of them. If there are no rows, the
+    law with the name of the driver controls the robot. ``heading`` is that at the
+    start, rad. ``source`` is the position of the source in W, m.
     """
     layout, driver, variant = names
     boxes = outside(boxes)
@@ -415,8 +435,8 @@ def draw_trial(
     draw = np.random.default_rng([seed, number])
     layout = str(draw.choice([*LAYOUTS]))
     driver = str(draw.choice([*drivers]))
-    # Successive numbers share a setting, because each setting needs its own blocks, and
-    # Drake never frees blocks.
+    # 200 successive trials have the same setting. Each setting needs its own blocks,
+    # and Drake never frees blocks.
     variant = setting or [*VARIANTS][number // 200 % len(VARIANTS)]
     boxes = LAYOUTS[layout](draw)
     angle = math.atan2(boxes[0][1], boxes[0][0]) + draw.normal(0.0, 0.3)
@@ -430,24 +450,25 @@ def draw_trial(
 
 
 def run_trial(trial: Trial, changes: dict[str, Any] | None = None) -> Outcome:
-    """Runs a trial, with changes as for ``run_result``, and returns its outcome."""
+    """Runs a trial and returns its outcome. ``changes`` are those of ``run_result``."""
     result = run_result(trial, changes)
     return Outcome(result.collision is not None, *least_clearances(result))
 
 
 def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult:
-    """Runs a trial after ``changes`` of the fields of its scenario."""
+    """Runs a trial. ``changes`` replace fields of its scenario before the run."""
     _NEXT[0] = trial.table
     fields = _merged(trial.fields, changes or {})
     return simulate(Scenario.model_validate(fields), engine="compiled")
 
 
 def least_clearances(result: RunResult) -> tuple[float, float]:
-    """Computes the least distances of a robot's body and disc from obstacles, m.
+    """Computes the least distances from the obstacles during a run, m.
 
-    The obstacles are at rest. The disc is centered on the axle and encloses the body.
-    The true poses are evaluated at the control periods and halfway between them. A
-    negative distance means an overlap.
+    The first distance is that of the robot's body. The second is that of the disc about
+    the axle that encloses the body. A negative distance means an overlap. The obstacles
+    must be at rest. The true poses of the robot are evaluated at the control updates
+    and halfway between them.
     """
     robot = result.scenario.only.robot
     others = result.surroundings.bodies.values()

@@ -1,9 +1,10 @@
 """Tries to make a guarded robot hit obstacles at rest, by random trials and by search.
 
-Runs last 10 s and use the compiled engine. Random trials draw layouts and drivers of
+Runs last 10 s and use the compiled engine. A driver is a program that commands the
+robot and tries to cause a collision. Random trials draw layouts and drivers from module
 ``driver_trials``. The search is SciPy's differential evolution over the positions of
-posts and the commands. The search minimizes the clearance of the disc that encloses the
-body. The results are formatted as JSON documents and as text.
+posts and the commands of the driver. It minimizes the clearance of the disc about the
+axle that encloses the body. The results are formatted as JSON documents and as text.
 """
 
 from __future__ import annotations
@@ -32,29 +33,31 @@ from analysis.safety.job_pool import run_jobs
 from systems.framework.signals import TICK_S
 from systems.safety.parameters import START_BUBBLE_M
 
-# Number of trials per job. A multiple of this has the same setting of the robot.
+# Number of trials per job. ``draw_trial`` changes the setting of the robot after a
+# multiple of this number, so that all trials of a job have the same setting.
 _CHUNK = 50
 # Number of jobs after which a worker process is replaced.
 _CHUNKS_A_WORKER = 200
-# The search: number of posts, number of commands, and members of a generation per
-# searched number.
+# For the search: number of posts, number of commands, and size of the population per
+# variable of the search.
 _POSTS, _COMMANDS, _MEMBERS = 3, 4, 4
 
 _KINDS = ("layout", "driver", "setting")
 
 
 class Found(NamedTuple):
-    """Result of a run."""
+    """Result of one run."""
 
     number: int
-    """Number of a random trial, or seed of the search."""
+    """Number of the random trial. For a run of a search: seed of the search."""
     kinds: tuple[str, str, str]
     """Names of layout, driver and setting."""
     collided: bool
+    """Whether the robot touched an obstacle."""
     clearance_m: float
     """Least clearance of the body, m."""
     disc_m: float
-    """Least clearance of the disc that encloses the body, m."""
+    """Least clearance of the disc about the axle that encloses the body, m."""
 
 
 def by_chance(
@@ -70,10 +73,13 @@ def by_chance(
 
 
 def searched_trial(x: NDArray[np.float64]) -> Trial:
-    """Converts a point of the search space to a trial.
+    """Converts a point ``x`` of the search space to a trial.
 
-    The point has the heading, rad; for each post, direction, rad, and distance, m; for
-    each command, duration, s, forward speed, m/s, and yaw rate, rad/s.
+    The elements of ``x`` are, in this order:
+
+    - the heading at the start, rad
+    - for each post: direction from the start, rad, and distance, m
+    - for each command: duration, s, forward speed, m/s, and yaw rate, rad/s
     """
     posts = np.reshape(x[1 : 1 + 2 * _POSTS], (_POSTS, 2)).tolist()
     boxes = [(r * math.cos(a), r * math.sin(a), 0.0, 0.02, 0.02) for a, r in posts]
@@ -88,8 +94,8 @@ def searched_trial(x: NDArray[np.float64]) -> Trial:
 def by_search(runs: int, seed: int) -> list[Found]:
     """Searches by differential evolution for a run in which the robot nearly collides.
 
-    The search takes about ``runs`` runs. It minimizes the clearance of the disc that
-    encloses the robot's body.
+    The search takes about ``runs`` runs, and returns the results of all of them. It
+    minimizes the clearance of the disc about the axle that encloses the robot's body.
     """
     bounds = [(-math.pi, math.pi)]
     bounds += [(-math.pi, math.pi), (START_BUBBLE_M + 0.012, 2.5)] * _POSTS
@@ -100,7 +106,8 @@ def by_search(runs: int, seed: int) -> list[Found]:
         trial = searched_trial(x)
         kinds = trial.layout, trial.driver, trial.variant
         found.append(Found(seed, kinds, *run_trial(trial)))
-        # If no body was near, the clearance is infinite.
+        # If no body was near, the clearance is infinite. The search needs a finite
+        # value.
         return min(found[-1].disc_m, 10.0)
 
     evolve(clearance, bounds, runs, seed)
@@ -113,7 +120,10 @@ def evolve(
     runs: int,
     seed: int,
 ) -> Any:
-    """Minimizes a function by differential evolution, with about ``runs`` calls."""
+    """Minimizes a function by differential evolution, with about ``runs`` calls.
+
+    ``bounds`` are the lower and upper limit of each variable. Returns SciPy's result.
+    """
     generations = max(1, runs // (_MEMBERS * len(bounds)) - 1)
     return differential_evolution(
         function, bounds, maxiter=generations, popsize=_MEMBERS, rng=seed,
@@ -122,10 +132,10 @@ def evolve(
 
 
 def largest_rate(collisions: int, runs: int) -> float:
-    """Computes the upper end of the 95 % interval of a collision rate.
+    """Computes an upper confidence limit (95 %) of the collisions per run.
 
-    Without collisions, the rate is about three divided by ``runs``. With collisions, it
-    is the upper end of Wilson's interval.
+    Without collisions, the one-sided limit is about 3 / ``runs``. With collisions, the
+    limit is the upper end of Wilson's two-sided interval.
     """
     if collisions == 0:
         return 1.0 - 0.05 ** (1.0 / runs)
@@ -145,7 +155,7 @@ def falsify(
 ) -> list[Found]:
     """Runs random trials, followed by one search per worker process.
 
-    The searches together take about ``search`` runs. ``progress`` is called with the
+    All searches together take about ``search`` runs. ``progress`` is called with the
     number of finished runs.
     """
     edges = [*range(0, runs, _CHUNK), runs]
@@ -162,7 +172,7 @@ def falsify(
 
 
 def falsification_summary(found: Sequence[Found], seed: int) -> dict[str, Any]:
-    """Builds the JSON document of short runs. Clearances are in m."""
+    """Builds the JSON document of the runs of ``falsify``. Clearances are in m."""
     groups = {
         kind: {
             name: _counts([each for each in found if each.kinds[place] == name])
@@ -196,7 +206,7 @@ def _counts(found: Sequence[Found]) -> dict[str, Any]:
 
 
 def falsification_text(summary: dict[str, Any]) -> str:
-    """Formats the document of short runs for a terminal."""
+    """Formats the document of ``falsification_summary`` for a terminal."""
     lines = []
     for kind, groups in summary["groups"].items():
         lines.append(f"by {kind}:")
@@ -225,7 +235,11 @@ def _clearances(run: dict[str, Any]) -> str:
 
 
 def trial_summary(trial: Trial, outcome: Outcome, seed: int) -> dict[str, Any]:
-    """Builds the JSON document of one trial. Commands have the fields of ``Row``."""
+    """Builds the JSON document of one trial.
+
+    Commands have the fields of ``Row``, with times in s and angular frequencies in
+    rad/s.
+    """
     tick_s = trial.fields.get("tick_s", TICK_S)
     rows = [Row(*row) for row in trial.table.reshape(-1, len(Row._fields)).tolist()]
     return {
@@ -245,7 +259,7 @@ def trial_summary(trial: Trial, outcome: Outcome, seed: int) -> dict[str, Any]:
 
 
 def trial_text(summary: dict[str, Any]) -> str:
-    """Formats the document of one trial for a terminal."""
+    """Formats the document of ``trial_summary`` for a terminal."""
     rows = [
         "  " + ", ".join(f"{name} {value:g}" for name, value in row.items())
         for row in summary["commands"]

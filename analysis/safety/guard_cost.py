@@ -1,4 +1,8 @@
-"""Measures the computing time of the guard and of the guarded law."""
+"""Measures the computing time of the guard and of the guarded law.
+
+The guard is the block that passes a command only if the robot can still brake in free
+space. The guarded law is a law that plans paths that the guard accepts.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +28,15 @@ class TickCost(NamedTuple):
     p99_ms: float | None
     """99 % quantile of the times, ms; None if only the whole run was timed."""
     worst_ms: float | None
-    """Longest time, ms; None if only the whole run was timed."""
+    """Longest time of a control period, ms; None if only the whole run was timed."""
 
 
 def tick_costs() -> list[TickCost]:
-    """Measures the guard in ``corridor``, and the guarded law in four scenarios."""
+    """Measures computing times per control period.
+
+    The scenario ``corridor`` runs with and without the guard in both engines. The
+    guarded law runs in four other scenarios with two sets of range sensors.
+    """
     costs = []
     for engine in ("compiled", "drake"):
         for guard in ("{}", "null"):
@@ -48,9 +56,10 @@ def tick_costs() -> list[TickCost]:
 
 
 def _tick_times(name: str, preset: str) -> NDArray[np.float64]:
-    """(ticks,) computing times per control period of the guarded law, s.
+    """(ticks,) computing times of the control periods with the guarded law, s.
 
-    The law runs three times in the compiled engine. Each time is the least of three.
+    The compiled engine runs the scenario three times. For each control period, the
+    least of its three times counts.
     """
     fields = ["hearing=ideal", "law=guarded", f"ultrasonic.preset={preset}"]
     scenario, times = load_scenario(name, fields), []
@@ -65,7 +74,7 @@ def _tick_times(name: str, preset: str) -> NDArray[np.float64]:
 
 
 def cost_summary(costs: Sequence[TickCost]) -> dict[str, Any]:
-    """Builds the JSON document of computing times per control period."""
+    """Builds the JSON document of the results of ``tick_costs``."""
     return {
         "schema_version": SCHEMA_VERSION,
         "versions": versions(),

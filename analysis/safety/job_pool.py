@@ -18,9 +18,10 @@ Result = TypeVar("Result")
 def run_jobs(
     jobs: Sequence[Callable[[], Result]], workers: int, *, jobs_a_worker: int
 ) -> Iterator[Result]:
-    """Runs picklable jobs in worker processes. Yields the results in order.
+    """Runs picklable jobs in worker processes. Yields the results in order of the jobs.
 
-    A process is replaced after ``jobs_a_worker`` jobs on average.
+    All processes are replaced after ``workers * jobs_a_worker`` jobs, so that each
+    process runs ``jobs_a_worker`` jobs on average.
     """
     # The executor's own option max_tasks_per_child can hang in Python 3.11 and in later
     # versions without this fix: https://github.com/python/cpython/issues/115634

@@ -1,6 +1,7 @@
-"""Long runs in which drivers try to make a guarded robot collide.
+"""Long runs in which drivers try to make a robot with a guard collide.
 
-A run lasts from minutes to an hour. ``jobs`` lists the drivers and settings.
+A driver is a program that commands the robot. A setting is a set of changes of the
+robot's parameters. A run lasts from minutes to an hour. ``jobs`` lists all runs.
 ``phonotaxis falsify --long`` runs them and prints the results.
 """
 
@@ -41,11 +42,12 @@ from analysis.safety.swinging_drivers import (
 from diagrams import RunResult
 from systems.framework.input_error import InputError
 
-#: Boxes around drivers with a given swing, or with a swing found by the drift search.
+#: Boxes in the runs with the swing that was found by hand, at several frequencies, and
+#: in the runs with the swing that the search for drift found.
 FOUR_BOXES = four_boxes(1.63)
 #: Settings that get the most simulated time.
 _MAIN = "plain", "encoders not rounded", "cells of 2 cm", "tick of 50 ms"
-#: Frequencies of runs with the swing that was found by hand, Hz.
+#: Frequencies with which the swing that was found by hand is repeated, Hz.
 _FREQUENCIES_HZ = 0.1, 0.3, 1.0, 2.0, 3.18, 5.0, 10.0
 _HOUR_S = 3600.0
 #: Number of runs of each search.
@@ -60,14 +62,17 @@ class LongRun(NamedTuple):
     """Result of a long run."""
 
     driver: str
+    """Name of the driver."""
     setting: str
+    """Name of the robot's setting."""
     simulated_s: float
+    """Simulated time, s."""
     contact_s: float
     """Time of the contact, s; infinite if there was none."""
     clearance_m: float
     """Least clearance of the body, m."""
     disc_m: float
-    """Least clearance of the disc that encloses the body, m."""
+    """Least clearance of the disc about the axle that encloses the body, m."""
     odometry_m: float
     """Largest position error of the odometry at the axle, m."""
     swing: Swing | None
@@ -78,12 +83,12 @@ Job = partial[list[LongRun]]
 
 
 class Journal:
-    """Saves the runs of each job in a file as soon as the job is done.
+    """File that receives the runs of each job as soon as the job is done.
 
-    The file need not exist. It has one JSON object per line. Each object holds the
-    seed, the number of the job, and the runs of the job. The journal ignores jobs with
-    other seeds in the file. Raises ``InputError`` if a line of the file does not
-    describe a job.
+    Each line of the file at ``path`` is a JSON object with the seed, the number of a
+    job, and the runs of this job. The file need not exist. ``done`` has the runs that
+    are in the file from earlier, by number of the job. It contains only jobs with the
+    given ``seed``. Raises ``InputError`` if a line of the file does not describe a job.
     """
 
     def __init__(self, path: Path, seed: int) -> None:
@@ -102,7 +107,10 @@ class Journal:
                 ) from None
 
     def keeping(self, number: int, job: Job) -> Job:
-        """Wraps a job so that it appends its runs to the file, in any process."""
+        """Returns a job that does the given job, and appends its runs to the file.
+
+        The returned job can run in any process.
+        """
         return partial(_keep, self._path, self._seed, number, job)
 
 
@@ -126,7 +134,7 @@ def _run_of(kept: dict[str, Any]) -> LongRun:
 
 
 def long_run(trial: Trial, swing: Swing | None = None) -> LongRun:
-    """Runs a trial, and records the driver's swing in the result."""
+    """Runs a trial. ``swing`` is the swing of its driver, for the result."""
     return _judged(trial.driver, trial.variant, swing, run_result(trial))
 
 
@@ -140,7 +148,10 @@ def _judged(
 
 
 def jobs(seed: int) -> list[Job]:
-    """Lists the jobs whose runs make up the table, longest first."""
+    """Lists the jobs of ``phonotaxis falsify --long``, roughly the longest first.
+
+    Each job returns the results of one or more runs.
+    """
     found: list[Job] = []
     slow_first = sorted(SETTINGS, key="cells of 2 cm".__ne__)
     found += [partial(_by_search_for_contact, each, seed) for each in _SEARCHED]
@@ -202,9 +213,9 @@ def _drawn_commands(setting: str, seed: int) -> list[LongRun]:
 
 
 def summary_table(runs: Sequence[LongRun], by: Sequence[str]) -> str:
-    """Summarizes runs in a Markdown table, grouped by the fields ``by`` of ``LongRun``.
+    """Summarizes runs in a Markdown table, with one row per group and one for all runs.
 
-    The last row is for all runs.
+    The runs of a group have the same values of the fields ``by`` of ``LongRun``.
     """
     groups: dict[tuple[str, ...], list[LongRun]] = {}
     for run in runs:
@@ -234,7 +245,10 @@ def _summed(runs: Sequence[LongRun]) -> list[str]:
 
 
 def long_summary(found: Mapping[int, Sequence[LongRun]], seed: int) -> dict[str, Any]:
-    """Builds the JSON document of long runs, given by number of their job."""
+    """Builds the JSON document of long runs.
+
+    ``found`` has the runs of each job, by number of the job.
+    """
 
     def told(job: int, run: LongRun) -> dict[str, Any]:
         contact_s = run.contact_s if math.isfinite(run.contact_s) else None
@@ -252,7 +266,10 @@ def long_summary(found: Mapping[int, Sequence[LongRun]], seed: int) -> dict[str,
 
 
 def long_text(found: Mapping[int, Sequence[LongRun]]) -> str:
-    """Formats tables by driver and setting, and one line per contact."""
+    """Formats tables of the runs by driver and by setting, and a line per contact.
+
+    ``found`` has the runs of each job, by number of the job.
+    """
     runs = [run for own in found.values() for run in own]
     by = (("driver", "setting"), ("driver",), ("setting",))
     tables = [f"{summary_table(runs, names)}\n" for names in by]

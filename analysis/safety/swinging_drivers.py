@@ -1,15 +1,16 @@
 """Drivers that swing to make the odometry drift, and then press against obstacles.
 
+A driver is a program that commands a robot with a guard and tries to cause a collision.
 To swing means to oscillate in forward speed and yaw rate. If the forward speed is in
 phase with the angular acceleration, the odometry errors of successive control periods
 can have the same sign. A driver of this module does the following:
 
-1. Turn around once, and visit each box.
-2. Return to the start, and swing there for minutes.
-3. Drive at the boxes again, and turn each front corner of the body toward them.
+1. It turns around once, and visits each box.
+2. It returns to the start, and swings there for minutes.
+3. It drives at the boxes again, and turns each front corner of the body toward them.
 
-The driver steers by the true pose. The driver therefore finds the boxes however far the
-odometry has drifted.
+The driver steers by the true pose. It therefore finds the boxes even if the odometry
+has drifted far.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ from diagrams import RunResult
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
 
-#: Range of the frequencies of swings, Hz.
+#: Lowest and highest frequency of random swings, Hz.
 SLOWEST_HZ, FASTEST_HZ = 0.1, 10.0
 #: Duration of a run in the search for drift, and in the search for a contact, s. The
-#: second is enough to visit four boxes, to swing, and to press against all four.
+#: second duration is enough to visit four boxes, to swing, and to press against them.
 _DRIFT_S, _CONTACT_S = 48.0, 450.0
 #: Position of the source, m. The drivers ignore it.
 _SOURCE = 80.0, 0.0
@@ -51,7 +52,7 @@ _CORNER = math.atan2(0.5 * RobotParameters().width_m, 0.5 * RobotParameters().le
 class Swing(NamedTuple):
     """Parameters of an oscillation of a driver's forward speed and yaw rate.
 
-    Fields without a description are those of ``Row``.
+    ``wave`` in ``driver_trials`` defines its shape.
     """
 
     swing_v: float
@@ -63,20 +64,23 @@ class Swing(NamedTuple):
     phase: float
     """Phase by which the yaw rate leads the forward speed, rad."""
     edge: float = 1.0
+    """Argument ``edge`` of ``wave``; 1: not limited."""
     skew: float = 0.0
+    """Argument ``skew`` of ``wave``; 0: not skewed."""
 
     def until(self, end_s: float) -> Row:
-        """Makes a row of a driver's table that swings until the given time, s."""
+        """Makes a row of a driver's table: swing until the time ``end_s``, s."""
         v, omega, hz, *shape = self
         return Row(end_s, TWIST, 0, 0, 0, 0, 0, v, omega, math.tau * hz, *shape)
 
 
-#: A swing that was found by hand: v = 0.72 cos(20 t), omega = 3.5 sin(20 t).
+#: A swing that was found by hand. Up to a common shift of the time t, s, it is
+#: v = 0.72 cos(20 t), m/s, and omega = 3.5 sin(20 t), rad/s.
 BY_HAND = Swing(0.72, 3.5, 20.0 / math.tau, -0.5 * math.pi)
 
 
 class _Script:
-    """Builds a driver's table step by step."""
+    """Builds the table of a driver, which is a list of timed commands."""
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
@@ -92,7 +96,7 @@ class _Script:
         self.add(8.0, Row(0.0, TWIST, 0.0, 0.9))
 
     def press(self, x: float, y: float) -> None:
-        """Adds a drive to a point, and turns of both front corners toward the point."""
+        """Adds a drive to a point in W, m, and turns each front corner toward it."""
         goal = Row(0.0, x=x, y=y, by_truth=1.0)
         self.add(2.0 + math.hypot(x, y) / 0.4, goal._replace(mode=AHEAD, v=0.4))
         for bearing in (_CORNER, -_CORNER):
@@ -100,7 +104,10 @@ class _Script:
             self.add(2.0, goal._replace(mode=AIM, omega=bearing))
 
     def home(self, heading: float, seconds: float) -> None:
-        """Adds a drive back to the start, and a turn to a heading."""
+        """Adds a drive to the start that may take ``seconds``, and a turn to a heading.
+
+        The heading is in rad.
+        """
         self.add(seconds, Row(0.0, AHEAD, 0.4, by_truth=1.0))
         x, y = 1e6 * math.cos(heading), 1e6 * math.sin(heading)
         self.add(2.0, Row(0.0, AIM, x=x, y=y, by_truth=1.0))
@@ -117,12 +124,13 @@ def swing_at_boxes(
     swing_s: float = 10.0,
     presses: int = 1,
 ) -> Trial:
-    """Makes a driver that visits boxes, swings, and presses against the boxes again.
+    """Makes a trial whose driver visits boxes, swings, and presses against the boxes.
 
     ``names`` are those of layout, driver and setting. A box is (x, y, theta, length,
-    width), m and rad. Between visits to ``presses`` boxes, the driver swings ``swings``
-    times, for ``swing_s`` each. It faces ``heading`` in rad at the start and at the
-    beginning of each swing. After each swing, it returns to the start.
+    width) in W, m and rad. After the first visits, the driver repeats two actions until
+    ``duration_s`` is over: it swings ``swings`` times for ``swing_s`` seconds each, and
+    it presses against the next ``presses`` boxes. After each swing and each press, it
+    returns to the start and turns to ``heading``, rad.
     """
     boxes, script, turn, home_s = outside(boxes), _Script(), 0, 4.0 + 0.03 * swing_s
     faces = [_nearest_point(box) for box in boxes]
@@ -151,11 +159,11 @@ def _nearest_point(box: Sequence[float]) -> tuple[float, float]:
 
 
 def swing_once(setting: str) -> Trial:
-    """Makes a driver that visits a box, swings once, and visits the box again.
+    """Makes a trial whose driver visits a box, swings once, and visits the box again.
 
-    The swing lasts 150 s. With grid cells of 2 cm, it lasts 80 s. With a control period
-    of 50 ms, it lasts 40 s. If the odometry approximates the arc of each control period
-    by its chord, the robot touches the box.
+    The swing lasts 80 s in the setting ``cells of 2 cm``, 40 s in the setting ``tick of
+    50 ms``, and 150 s in all other settings. In this trial, a robot whose odometry
+    approximates the arc of each control period by its chord touches the box.
     """
     names, box = ("box", "swing, by hand, once", setting), (0.0, -2.63, 0.0, 0.3, 0.3)
     swing_s = {"cells of 2 cm": 80.0, "tick of 50 ms": 40.0}.get(setting, 150.0)
@@ -164,7 +172,10 @@ def swing_once(setting: str) -> Trial:
 
 
 def swing_alone(swing: Swing, setting: str, duration_s: float) -> Trial:
-    """Makes a driver that turns around once and then swings on an empty floor."""
+    """Makes a trial whose driver turns around once, then swings on an empty floor.
+
+    The whole trial lasts ``duration_s``.
+    """
     names, script = ("empty", "swing", setting), _Script()
     script.look_around()
     script.add(duration_s, swing.until(0.0))
@@ -184,22 +195,22 @@ _BOUNDS = (
 
 
 def draw_swing(draw: np.random.Generator) -> Swing:
-    """Draws a swing with a frequency from ``SLOWEST_HZ`` to ``FASTEST_HZ``."""
+    """Draws a random swing within the bounds ``_BOUNDS``."""
     return _swing_at(draw.uniform(size=len(_BOUNDS)))
 
 
 def _swing_at(x: Any) -> Swing:
-    """Converts a point of the unit cube to a swing."""
+    """Converts a point of the unit cube to a swing within the bounds ``_BOUNDS``."""
     low, high = np.transpose(_BOUNDS)
     v, log_omega, log_hz, *shape = (low + (high - low) * np.asarray(x)).tolist()
     return Swing(v, math.exp(log_omega), math.exp(log_hz), *shape)
 
 
 def _repeated(swing: Swing, setting: str) -> Swing:
-    """Changes the period of an oscillation to a whole number of control periods.
+    """Changes the period of a swing to a whole number of control periods.
 
-    The encoders then round each period of the oscillation alike. The errors of the
-    periods therefore add up.
+    The rounding errors of the wheel encoders are then the same in each period of the
+    swing, and add up.
     """
     tick_s = SETTINGS[setting].get("tick_s", TICK_S)
     period_s = tick_s * max(round(1.0 / (swing.hz * tick_s)), 2)
@@ -207,7 +218,7 @@ def _repeated(swing: Swing, setting: str) -> Swing:
 
 
 def odometry_error(result: RunResult) -> NDArray[np.float64]:
-    """(ticks,) distance from the axle's estimated position to its true position, m."""
+    """Returns the (ticks,) errors of the odometry's position of the axle, m."""
     columns = result.columns
     x = columns["p_WB_x"] - columns["p_WB_estimated_x"]
     y = columns["p_WB_y"] - columns["p_WB_estimated_y"]
@@ -217,8 +228,8 @@ def odometry_error(result: RunResult) -> NDArray[np.float64]:
 def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
     """Searches by differential evolution for the swing with the largest odometry drift.
 
-    The search takes about ``runs`` runs of 48 s each. Returns the swing and its drift,
-    m/s.
+    The search takes about ``runs`` runs of 48 s each. Returns the swing, and its drift:
+    the position error at the end of the run divided by the duration, m/s.
     """
 
     def drift(x: NDArray[np.float64]) -> float:
@@ -231,10 +242,11 @@ def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
 
 
 def four_boxes(distance_m: float) -> list[tuple[float, ...]]:
-    """Places boxes on all four sides of the start, for drift in any direction.
+    """Places a box on each of the four sides of the start.
 
-    Each box is (x, y, theta, length, width), m and rad. ``distance_m`` is the distance
-    of the box centers from the start.
+    A drift of the odometry in any direction then brings the robot near a box. Each box
+    is (x, y, theta, length, width) in W, m and rad. ``distance_m`` is the distance of
+    the box centers from the start.
     """
     sides = (0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0)
     return [(distance_m * x, distance_m * y, 0.0, 0.3, 0.3) for x, y in sides]
@@ -250,7 +262,8 @@ def search_contact(
 
     The search takes about ``runs`` runs of 450 s each. It varies the heading, the
     distance of four boxes, and the swing. It minimizes the value that ``judge`` returns
-    for the swing and the result of a run.
+    for the swing and the result of a run, such as the least clearance, m. The caller
+    can record all runs in ``judge``.
     """
     names = "four boxes", "swing, searched for contact", setting
 
@@ -260,7 +273,8 @@ def search_contact(
             names, four_boxes(far), swing, _CONTACT_S, heading=heading, swings=6,
             swing_s=40.0, presses=4,
         )  # fmt: skip
-        # If the robot never came near a body, the clearance is infinite.
+        # If the robot never came near a body, the judged clearance is infinite. The
+        # search needs a finite value.
         return min(judge(swing, run_result(trial)), 10.0)
 
     evolve(worth, [(0.0, 1.0)] * (len(_BOUNDS) + 2), runs, seed)

@@ -2,24 +2,26 @@
 
 The attraction is the virtual spring (stiffness K_r) and damper (damping D_r) that pull
 the robot to the follow point. The follow point has a given distance, the follow
-distance, from the source. The search has these steps:
+distance, from the source. The law is the virtual force that pushes the robot away from
+obstacles. The search has these steps:
 
 1. For each of several K_r, find the least D_r with which the loop to the follow point
    has the required margins, and with which the motion in front of an obstacle (the
-   contact mode) is stable. The loop has sampling and motor lag, but no force of the
-   law.
-2. If the current K_r and D_r meet these requirements, keep them. Otherwise, take the
-   current K_r if possible, or else the K_r with the least lag.
-3. If the overshoot needs a longer follow distance than the current one, take this
-   distance.
-4. If the gains of the scenario's law miss a requirement, choose new gains. Increase the
-   follow distance until the push away from the leader shifts the robot little enough.
-   The leader is the robot that carries the source.
-5. If the new gains of the law need more damping in front of an obstacle, start again
-   with these gains.
+   contact mode) is stable. The model of the loop has sampling and motor lag. It leaves
+   out the force of the law.
+2. If the current K_r and D_r meet these requirements, keep them. Otherwise, keep the
+   current K_r and take the D_r from step 1. If no D_r suffices for the current K_r,
+   take the other K_r with which the robot lags least behind a moving source.
+3. Simulate the overshoot when the robot brakes from top speed. If the follow distance
+   is too short for this overshoot, increase it.
+4. If the gains of the scenario's law miss a requirement, choose new gains. The law also
+   pushes the robot away from the leader, which is the robot that carries the source.
+   Increase the follow distance until this push shifts the robot little enough.
+5. If the motion in front of an obstacle is unstable with the new gains of the law,
+   search for the least D_r again, now with these gains.
 
-The law also pushes the robot away from the leader's body. ``WholeLoop`` has the margins
-of the loop with this push.
+The margins of step 1 leave out the push away from the leader. ``WholeLoop`` has the
+margins of the loop with this push.
 """
 
 from __future__ import annotations
@@ -62,16 +64,15 @@ from systems.laws.parameters import AttractionParameters
 _SPRINGS = (0.5, 1.0, 2.0, 4.0)
 #: Values of D_r that are tried, as multiples of critical damping.
 _DAMPERS = np.geomspace(0.05, 3.0, 30)
-#: Places where the loop is cut.
+#: Places at which the loop is cut to compute its margins.
 _CUTS: tuple[BreakPoint, ...] = ("sensor", "actuator")
-#: Largest number of searches with new gains of the law. The second usually suffices.
+#: Largest number of rounds of steps 3 to 5. Usually, two rounds suffice.
 _ROUNDS = 4
 #: The follow distance is rounded up to a multiple of this step, m.
 _STEP_M = 0.05
-#: The first number is the distance of a source so far away that P reaches top speed,
-#: m.
-#: The second number is a follow distance so large that P stops in front of the
-#: source, m.
+#: Simulation of the overshoot. ``_APPROACH_M``: initial distance of the source, m. It
+#: is so long that P reaches top speed. ``_STAND_OFF_M``: follow distance, m. It is so
+#: long that P stops in front of the source.
 _APPROACH_M, _STAND_OFF_M = 8.0, 3.0
 
 
@@ -79,8 +80,8 @@ _APPROACH_M, _STAND_OFF_M = 8.0, 3.0
 class GainFigures:
     """Performance figures of one pair of gains K_r and D_r.
 
-    Each margin, and the sensitivity peak M_s, is the worse of those at the sensor and
-    at the actuator.
+    The loop is cut once at the sensor and once at the actuator. Each margin, and the
+    sensitivity peak M_s, is the worse of the two values.
     """
 
     stiffness_n_m: float
@@ -93,15 +94,18 @@ class GainFigures:
     sensitivity_peak: float
     disk_margin: float
     delay_margin_s: float
-    """Phase margin divided by crossover frequency, s."""
+    """Smallest ratio of phase lag margin to frequency over all gain crossovers, s."""
     contact_radius: float
-    """Spectral radius of the motion in front of an obstacle; stable below 1."""
+    """Spectral radius of the motion in front of an obstacle, where the law is stiffest.
+    The motion is stable if the radius is below 1."""
     following_lag_m: float
-    """Lag of the robot behind the follow point of the moving source, m."""
+    """Distance of the robot behind the follow point while the source moves at its
+    speed, m."""
     settling_s: float
     """Time in which a small deviation falls to 2 %, s."""
     largest_law_stiffness_n_m: float
-    """Largest stiffness of a law with which the contact mode is stable, N/m."""
+    """Largest stiffness of a law with which the motion in front of an obstacle is
+    stable, N/m."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +120,10 @@ class GainChoice:
 
 @dataclass(frozen=True)
 class WholeLoop:
-    """Least margins at rest of the loop that includes the law, over all cuts.
+    """Least stability margins of the loop with the force of the law, over all cuts.
 
-    Gain may rise or fall, and phase may lag or lead.
+    The robot rests at its equilibrium behind the leader. Gain margins cover both a
+    higher and a lower gain. Phase margins cover both a lag and a lead.
     """
 
     gain_margin_db: float
@@ -142,15 +147,19 @@ class RecommendedGains:
     scenario: Scenario
     """Scenario with the current gains."""
     today: GainFigures
+    """Performance figures of the current K_r and D_r."""
     choices: tuple[GainChoice, ...]
     """The least D_r for several K_r, with the current gains of the law."""
     chosen: Scenario | None
     """Scenario with the recommended K_r, D_r, follow distance, and gains of its law.
     None if no gains meet the requirements."""
     recommended: GainFigures | None
+    """Performance figures of the recommended K_r and D_r. None if there are none."""
     law: LawDesign | None
-    """Gains of the law. None if the design chooses no gains of this law."""
+    """Recommended gains of the law, and their checks. None without a recommendation,
+    and for a law that is not in ``DESIGNED_LAWS``."""
     whole_loop: WholeLoop | None
+    """Margins with the recommended gains. None if there are none."""
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the figures and the recommended gains for the JSON document."""
@@ -167,7 +176,10 @@ class RecommendedGains:
 
     @property
     def settings(self) -> dict[str, float]:
-        """Recommended values of the fields of the scenario that change, by field."""
+        """Recommended values that differ from the current ones, by field.
+
+        An example of a field is ``attraction.damping_n_s_m``.
+        """
         if self.chosen is None:
             return {}
         now, then = self.scenario.follower, self.chosen.follower
@@ -187,7 +199,7 @@ class RecommendedGains:
 
     @property
     def command(self) -> str:
-        """Command line that simulates the recommended gains; empty without any."""
+        """Command line that simulates the recommended gains; empty if none exist."""
         if self.chosen is None:
             return ""
         name = self.scenario.name
@@ -294,7 +306,7 @@ def _best(choices: Sequence[GainChoice], K_r: float) -> GainFigures | None:
 def _chosen(
     scenario: Scenario, best: GainFigures | None, requirements: Requirements
 ) -> Scenario | None:
-    """The scenario with K_r, D_r, follow distance and gains of its law, or None."""
+    """Repeats steps 3 to 5 of the module from ``best``. None if no gains suffice."""
     for _ in range(_ROUNDS):
         if best is None:
             return None
@@ -307,10 +319,12 @@ def _chosen(
 
 
 def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scenario:
-    """Chooses the follow distance, and the gains of the scenario's law with it.
+    """Returns a copy with a follow distance and gains of the law that fit each other.
 
     The follow distance is at least the current one, and leaves room for the overshoot.
-    At rest, the law shifts P by at most the required offset.
+    For a law whose tuning ``sets_follow_distance``, the follow distance is also so long
+    that the law shifts P at rest by at most ``rest_offset_m``. The gains are those of
+    ``fitting_gains``. For a law that is not in ``DESIGNED_LAWS``, the gains stay.
     """
     law = scenario.only.law
     least = follow_distance(scenario, requirements, braking_overshoot(scenario))
@@ -334,7 +348,10 @@ def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scen
 def fitting_gains(
     scenario: Scenario, requirements: Requirements, *laws: str
 ) -> LawGains:
-    """Returns the gains of a scenario, new for laws that miss a requirement."""
+    """Returns the gains of all laws of a scenario.
+
+    Those of ``laws`` that miss a requirement get new gains. All other gains stay.
+    """
     unfit = [x for x in laws if not check_law(scenario, x, requirements).acceptable]
     return search_gains(scenario, requirements, laws=unfit)
 
@@ -353,7 +370,11 @@ def _whole_loop(chosen: Scenario) -> WholeLoop:
 def least_damping(
     scenario: Scenario, K_r: float, requirements: Requirements
 ) -> GainChoice:
-    """Finds the least D_r, up to three times critical, that meets the requirements."""
+    """Finds the least damping D_r that meets the requirements for one stiffness K_r.
+
+    ``K_r`` is in N/m. D_r is at most three times the damping that is critical for K_r
+    and the virtual mass.
+    """
     critical = 2.0 * math.sqrt(K_r * scenario.only.robot.mass_kg)
 
     def meets(D_r: float) -> bool:
@@ -371,7 +392,10 @@ def least_damping(
 
 
 def _bisected(meets: Callable[[float], bool], low: float, high: float) -> float:
-    """Least value that meets the requirements, if possible rounded up to 2 decimals."""
+    """Bisects between a value that fails (``low``) and one that meets (``high``).
+
+    The result is rounded up to two decimals if the rounded value also meets.
+    """
     while high - low > 1e-3 * high:
         middle = (low + high) / 2.0
         low, high = (low, middle) if meets(middle) else (middle, high)
@@ -380,7 +404,10 @@ def _bisected(meets: Callable[[float], bool], low: float, high: float) -> float:
 
 
 def _checks(scenario: Scenario, requirements: Requirements) -> Iterator[Check]:
-    """Checks of K_r and D_r, the quickest first."""
+    """Yields the checks of K_r and D_r. The checks that take the least time come first.
+
+    The caller can stop at the first check that is not met.
+    """
     limits = dict(requirements.loop())
     K_r = scenario.follower.attraction.stiffness_n_m
     ratio = contact_model(scenario, K_r).damping_ratio
@@ -406,7 +433,10 @@ def _margins(loop: LoopMargins) -> dict[str, float]:
 
 
 def _contact(scenario: Scenario, requirements: Requirements) -> LinearModel:
-    """Motion in front of an obstacle where the law is stiffest, with late echoes."""
+    """Returns the motion in front of an obstacle, at the distance of the stiffest push.
+
+    Echoes are late by ``spare_latency_ticks``.
+    """
     total = scenario.follower.attraction.stiffness_n_m
     total += radial_law(scenario).stiffest_n_m
     late = requirements.spare_latency_ticks
@@ -417,9 +447,9 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
     """Returns the sampled open loop of the attraction without the force of the law.
 
     The attraction consists of a spring and a damper. The robot moves along the line to
-    a source at rest. A cut at ``sensor`` opens the path of the spring only. A cut at
-    ``actuator`` opens the paths of both the spring and the damper. The input and the
-    output are accelerations, m/s^2.
+    a source at rest. A cut at the ``sensor`` opens the feedback by the spring, and the
+    feedback by the damper stays closed. A cut at the ``actuator`` opens the feedback by
+    spring and damper. The input and the output are accelerations, m/s^2.
     """
     chain = motion_chain(scenario)
     mass = scenario.only.robot.mass_kg
@@ -439,7 +469,7 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
 def gain_figures(scenario: Scenario, requirements: Requirements) -> GainFigures:
     """Computes performance figures of the stiffness K_r and damping D_r of a scenario.
 
-    Of the requirements, only ``spare_latency_ticks`` is used.
+    Only the field ``spare_latency_ticks`` of ``requirements`` is used.
     """
     both = [_margins(loop_margins(attraction_loop(scenario, at))) for at in _CUTS]
     worst = {
@@ -464,9 +494,9 @@ def gain_figures(scenario: Scenario, requirements: Requirements) -> GainFigures:
 def braking_overshoot(scenario: Scenario) -> float:
     """Simulates a braking robot and returns its overshoot past the follow point, m.
 
-    The source is at rest, and the robot approaches at top speed. The simulation has
-    exact hearing, no obstacle, and no law. If the robot does not overshoot, the result
-    is 0.
+    The source is at rest, and the robot approaches it at top speed. The simulation has
+    exact hearing, no obstacle, and no force of the law. If the robot does not
+    overshoot, the result is 0.
     """
     changes = {
         "law": "none",
@@ -485,9 +515,9 @@ def follow_distance(
 ) -> float:
     """Returns the least follow distance that leaves room for an overshoot, m.
 
-    This is the distance from the follower's control point to the source, rounded up to
-    a multiple of 5 cm. The follower passes the follow point by ``overshoot_m`` and
-    keeps the clearance to the body of the leader, which carries the source.
+    If the control point P passes the follow point by ``overshoot_m``, P still keeps
+    ``requirements.clearance_m`` to the body of the leader, which carries the source.
+    The result is rounded up to a multiple of 5 cm.
     """
     room = scenario.source.length_m / 2.0 + requirements.clearance_m
     least = overshoot_m + room

@@ -12,11 +12,12 @@ from systems.laws.catalog import FORCE_LAWS, LAWS, ROUTE_LAWS
 def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...]:
     """Returns one copy of a scenario for each chosen law, in the order of the names.
 
-    The name ``all`` means all force laws except ``none``. For a robot on a route,
-    ``all`` means all laws for routes. For a robot that searches, ``all`` means the law
-    of the scenario. If there are no names, the law of the scenario is chosen. A law
-    that is named twice has one copy. The function raises an InputError if a law does
-    not exist, or if it cannot be analyzed for this robot.
+    The name ``all`` means all laws that compute a force (``FORCE_LAWS``), except the
+    law ``none``. For a robot on a route, ``all`` means all laws for routes. For a robot
+    that searches, ``all`` means the law of the scenario. If there are no names, the law
+    of the scenario is chosen. A law that is named twice has one copy. The function
+    raises an InputError if a law does not exist, or if the report cannot analyze this
+    law for this robot.
     """
     routed = scenario.only.kind == "router"
     every = list(ROUTE_LAWS if routed else FORCE_LAWS)
@@ -54,9 +55,10 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
 def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
     """Returns a scenario with only one robot, and a text that lists the other robots.
 
-    The scenario also contains the source that the robot follows. Without a name, the
-    first robot is chosen. The text is empty if there are no other robots. The function
-    raises an InputError if the scenario has no robot with this name.
+    The new scenario also contains the source that the robot follows. ``name`` is the
+    name of the robot; None means the first robot. If the scenario has only one robot,
+    the text is empty. The function raises an InputError if the scenario has no robot
+    with this name.
     """
     names = list(scenario.robots)
     if name is not None and name not in names:

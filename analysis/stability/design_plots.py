@@ -1,4 +1,4 @@
-"""Figure of the design: push against pull, and stiffness limits in contact."""
+"""Figure of ``phonotaxis design``: forces near an obstacle, and stiffness limits."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ _DISTANCE_M = np.linspace(0.005, 1.2, 240)
 
 
 def plot_design(study: DesignStudy) -> Figure:
-    """Plots the forces of the laws, and their stiffness against its stability limits.
+    """Plots the forces of the laws, and compares their stiffness with its limits.
 
-    The left panel shows forces over the distance of an obstacle. It compares the push
-    of each law away from the obstacle with the pull toward the source. In shaded areas,
-    the push exceeds the pull. The right panel shows the stiffness of each law, and the
-    limits of a stable motion at an obstacle, over the damping D_r. The attraction is
-    the current one, and not the recommended one.
+    The left panel shows forces over the distance of an obstacle: the push of each law
+    away from the obstacle, and the pull of the attraction toward the source. In shaded
+    areas, the push exceeds the pull. The right panel has the damping D_r of the
+    attraction on its horizontal axis. It shows the largest stiffness of each law, and
+    the stiffness up to which the motion in front of an obstacle is stable. Both panels
+    use the scenario's current attraction, not the recommended one.
     """
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
     balance, conflict = figure.subplots(1, 2)

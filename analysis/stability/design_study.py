@@ -1,4 +1,9 @@
-"""The complete design: gains for the current and for the recommended attraction."""
+"""Computes the result of ``phonotaxis design``.
+
+The result has gains of the laws for two attractions: for the scenario's current
+attraction, and for the recommended attraction. The attraction is the virtual spring and
+damper that pull the robot to the follow point.
+"""
 
 from __future__ import annotations
 
@@ -36,16 +41,16 @@ from diagrams import load_scenario, simulate
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
-#: Lateral offsets of the start, m. At both ends, the robot starts in front of an
-#: obstacle.
+#: Values of y at the start in the scenario ``two_static_obstacles``, m. For the first
+#: and the last value, an obstacle is straight ahead of the robot's body.
 JAM_STARTS_M = tuple(np.linspace(-0.6, 0.6, 9).round(3).tolist())
-#: Distances from the obstacle to the point of rest in the table of barriers, m.
+#: Distances from the obstacle to the follow point behind it, for ``BarrierRow``, m.
 _TO_GO_M = (1.0, 1.5, 2.0, 3.0)
 
 
 @dataclass(frozen=True)
 class JamRuns:
-    """The outcomes of the runs of one law."""
+    """The outcomes of the runs of one law in the scenario ``two_static_obstacles``."""
 
     law: str
     causes: dict[str, int]
@@ -65,12 +70,13 @@ class Alternative:
     follow_distance_m: float
     """Least follow distance that leaves room for the overshoot, m."""
     meters_to_go: float
-    """Distance from an obstacle to the point of rest behind it, m."""
+    """Distance from an obstacle to the follow point behind it, m."""
     allowed_stiffness_n_m: float
-    """Largest stiffness of a push that is stable in contact with late echoes, N/m."""
+    """Largest stiffness of a law with which the motion in front of an obstacle is
+    stable although echoes are late, N/m."""
     laws: tuple[LawDesign, ...]
     jams: tuple[JamRuns, ...]
-    """Simulated runs toward two obstacles, one entry per law."""
+    """Simulated runs past two obstacles to the goal, one entry per law."""
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the figures and the attraction for the JSON document."""
@@ -80,14 +86,17 @@ class Alternative:
 
 @dataclass(frozen=True)
 class BarrierRow:
-    """K_0 of the conventional law that stops P, for one position of the target."""
+    """Stiffness K_0 with which the conventional law just stops P before an obstacle.
+
+    The follow point is behind the obstacle, so the attraction pulls P toward it.
+    """
 
     meters_to_go: float
-    """Distance of the point of rest behind the obstacle, m."""
+    """Distance from the obstacle to the follow point behind it, m."""
     stiffness_n_m: float
-    """K_0 if the speed is limited during the whole approach, N/m."""
+    """K_0 if P never exceeds its top speed, N/m."""
     stiffness_from_reach_n_m: float
-    """K_0 if the speed is not limited within the reach rho_0 of the law, N/m."""
+    """K_0 if P may exceed its top speed within the reach rho_0 of the law, N/m."""
 
 
 @dataclass(frozen=True)
@@ -100,17 +109,16 @@ class DesignStudy:
     """Kinetic energy of the virtual mass at top speed, J."""
     barriers: tuple[BarrierRow, ...]
     contact_limits_n_m: tuple[float, ...]
-    """Largest stable stiffness of a push if echoes are 0, 1, 2, and 4 ticks late,
-    N/m."""
+    """Largest stiffness of a law with which the motion in front of an obstacle is
+    stable if echoes are 0, 1, 2, and 4 ticks late, N/m."""
     today: Alternative
-    """The attraction of the scenario. The laws may push P at rest to the edge of the
-    goal."""
+    """The current attraction, with new gains of the laws. The requirements on these
+    gains let the push away from the leader shift P at rest to the edge of the goal."""
     recommended: Alternative
-    """The attraction that meets the requirements with the scenario's law, and gains of
-    all laws for this attraction."""
+    """The recommended attraction, with gains of all laws for this attraction."""
 
 
-#: Latencies for ``DesignStudy.contact_limits_n_m``, in control periods.
+#: Latencies of the echoes for ``DesignStudy.contact_limits_n_m``, in control periods.
 _TICKS = (0, 1, 2, 4)
 #: Number of simulated runs in a complete study.
 STUDY_RUNS = 2 * len(DESIGNED_LAWS) * len(JAM_STARTS_M)
@@ -122,13 +130,14 @@ def study_design(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> DesignStudy:
-    """Chooses gains of the laws for a scenario, and also recommends another attraction.
+    """Chooses gains of the laws for two attractions: the current and a recommended one.
 
-    The recommendation is that of the stability report. Of the parameters of the
-    scenario's laws, only the reaches and the speed limits are used. ``progress`` is
-    called with the number of finished runs, of which there are ``STUDY_RUNS``. Raises
-    InputError if there are several robots, or if no gains meet a requirement that must
-    be met.
+    The recommended attraction is that of the stability report. For the current
+    attraction, all laws get new gains. For the recommended attraction, a law keeps its
+    gains if they meet the requirements. The other parameters of the laws, such as
+    reaches and speed limits, stay. ``progress`` is called with the number of finished
+    runs; the study has ``STUDY_RUNS`` runs. Raises InputError if there are several
+    robots, or if no gains meet a requirement that must be met.
     """
     scenario.require_one_robot("a design of gains")
     requirements = requirements or Requirements()
@@ -193,9 +202,11 @@ def jam_runs(
 ) -> list[JamRuns]:
     """Simulates ``two_static_obstacles`` for each law and each of ``JAM_STARTS_M``.
 
-    The runs have exact hearing and ultrasonic cones. Besides the gains, they use the
-    tick, the engine, and the sample periods of the sensors of ``scenario``.
-    ``progress`` is called with the number of finished runs.
+    The runs have exact hearing and ultrasonic cones. They take the attraction, the
+    parameters of the laws, the control period, the engine, the length of a frame of
+    audio, and the period of the ultrasonic sensors from ``scenario``. The speed limit
+    of the active law is that of ``two_static_obstacles``. ``progress`` is called with
+    the number of finished runs.
     """
     settings = (
         f"tick_s={scenario.tick_s}",

@@ -86,9 +86,10 @@ def _check_text(check: Check) -> str:
 
 
 def design_document(study: DesignStudy) -> dict[str, Any]:
-    """Returns the JSON document of the design, from plain values.
+    """Returns the JSON document of the design.
 
-    The key ``out`` is None until the files of the design have a directory.
+    The key ``out`` is for the directory of the design's files. It is None in the
+    result; the caller sets it after choosing a directory.
     """
     return {
         "schema_version": SCHEMA_VERSION,
@@ -103,12 +104,13 @@ def write_design(study: DesignStudy, document: dict[str, Any], directory: Path) 
     """Writes the files of a design into an existing directory.
 
     - ``summary.json`` is the JSON document from ``design_document``.
-    - ``scenario.yaml`` is the scenario with the current attraction and new gains of the
-      laws.
-    - ``recommended.yaml`` is the scenario with the recommended attraction and new gains
+    - ``scenario.yaml`` is the scenario with the current attraction, and with new gains
       of the laws.
+    - ``recommended.yaml`` is the scenario with the recommended attraction, and with
+      gains of the laws for this attraction.
     - ``design.png`` is the figure of ``plot_design``.
-    - ``law_curves.png`` shows the forces of the laws.
+    - ``law_curves.png`` shows the forces of the laws in ``scenario.yaml``, for both
+      forms of the velocity term.
     """
     from analysis.loops.law_curves import law_curves, plot_law_curves
     from analysis.loops.push_and_pull import DESIGNED_LAWS

@@ -1,11 +1,12 @@
 """Search for gains of the laws that meet given requirements.
 
-The gains are the springs K_0 and k_ref, and the dampers D_0 and d_ref. If two
-requirements exclude each other, the one that comes first in this list has priority:
+The gains are the stiffnesses K_0 and k_ref, and the dampings D_0 and d_ref. If the
+gains cannot meet two requirements at once, the first of the two in this list has
+priority:
 
-- The barrier, which stops the robot in front of an obstacle.
-- The contact, which must be stable in front of an obstacle.
-- The offset, which the law causes at the follow point.
+- Barrier: the law stops the robot in front of an obstacle.
+- Contact: the motion in front of an obstacle is stable.
+- Offset: the law shifts the robot at rest from its follow point by little.
 
 docs/avoidance.md explains these requirements.
 """
@@ -43,7 +44,7 @@ from systems.laws.catalog import LAWS
 _FIGURES = 3
 #: Least and largest spring gain of the search, N/m or N m.
 _GAINS = (1e-3, 1e5)
-#: Least and largest decay length of the search by the rule ``matched``, m.
+#: Least and largest decay length alpha of the force in ``_matched_spring``, m.
 _ALPHAS_M = (0.05, 1.0)
 
 
@@ -53,9 +54,10 @@ def search_gains(
     *,
     laws: Iterable[str] = tuple(DESIGNED_LAWS),
 ) -> LawGains:
-    """Finds gains of laws of ``DESIGNED_LAWS`` that meet the requirements.
+    """Returns the gains of all laws of a scenario, with new gains for ``laws``.
 
-    The reaches, speed limits, and saturations of the scenario's laws stay. Raises
+    ``laws`` are names from ``DESIGNED_LAWS``. The search changes only the stiffness and
+    damping of these laws; reaches, speed limits, and saturations stay. Raises
     InputError if no gain meets a requirement that must be met.
     """
     for law in laws:
@@ -73,10 +75,11 @@ def gain_for_barrier(
 ) -> float:
     """Returns the value of a gain with which a law just stops the robot at an obstacle.
 
-    During an approach, the push of the law must take the kinetic energy of top speed
-    from the robot. This energy is called the barrier. ``field`` is a gain in N/m or N m
-    to which the push is proportional. ``also`` has other gains of the law as multiples
-    of this gain. Raises InputError if no gain from 1e-3 to 1e5 stops the robot.
+    During the approach, the push of the law minus the pull of the attraction must
+    remove the kinetic energy that the robot has at top speed. ``field`` is the name of
+    the gain, which is in N/m or N m. The push is proportional to this gain. ``also``
+    has other gains of the law, as multiples of this gain. Raises InputError if no value
+    from 1e-3 to 1e5 stops the robot.
     """
     to_go, energy = meters_to_go(scenario, requirements), kinetic_energy(scenario)
 
@@ -93,11 +96,12 @@ def gain_for_barrier(
 def _barrier_gains(
     scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
-    """Derives the two gains of a law by the rule ``barrier``."""
+    """Derives the stiffness and the damping of a law by the rule ``barrier``."""
     gains = LAWS[law].loop_gains
     assert gains is not None, f"{law} does not name the gains that tune it"
     spring_gain, damper_gain = gains
-    # The velocity term D_0 s returns the share D_0/D_r of the dissipation.
+    # While the robot recedes at the speed s, the velocity term D_0 s adds the power
+    # D_0 s^2, and the damping D_r of the attraction removes the power D_r s^2.
     D_r = scenario.follower.attraction.damping_n_s_m
     damping = _rounded(requirements.injected_share * D_r)
     found = gain_for_barrier(scenario, law, spring_gain, requirements)
@@ -108,9 +112,9 @@ def _barrier_gains(
 def _matched_gains(
     scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
-    """Derives the gains of both terms of the active law of 2019."""
-    # The push on a far echo includes the tail of the spring term. The second round
-    # takes this tail into account.
+    """Derives all four gains of the active law of 2019 by the rule ``matched``."""
+    # The damper term depends on the push by a far echo, and this push includes the
+    # tail of the spring term. Only the second round has the final tail.
     for _ in range(2):
         scenario = _matched_damper(scenario, law, requirements)
         scenario = _matched_spring(scenario, law, requirements)
@@ -124,7 +128,12 @@ _RULES = {"barrier": _barrier_gains, "matched": _matched_gains}
 def _matched_damper(
     scenario: Scenario, law: str, requirements: Requirements
 ) -> Scenario:
-    """Derives d_ref from the offset by a far echo, and D_0 from the returned energy."""
+    """Derives the two gains d_ref and D_0 of the damper term.
+
+    With d_ref, an echo at the largest sensor range shifts P at rest by
+    ``far_offset_m``. With D_0, the velocity term adds the share ``injected_share`` of
+    the power that the damping D_r removes.
+    """
     far = scenario.follower.ultrasonic.maximum_range_m
     tail = spring(law, scenario)(far)
     at_rest = (
@@ -154,9 +163,10 @@ def _matched_spring(
 ) -> Scenario:
     """Derives the two gains of the spring term of the active law of 2019.
 
-    The gain k_ref follows from the kinetic energy that the law must remove. The second
-    gain follows from the decay length alpha of the force. With a longer alpha, the
-    force is softer and reaches farther. The function chooses alpha in two steps:
+    The gain k_ref follows from the kinetic energy that the law must remove. The ratio
+    of the two gains follows from the decay length alpha of the force. With a longer
+    alpha, the force is softer and reaches farther. The function chooses alpha in two
+    steps:
 
     - It takes the longest alpha with an acceptable offset at rest.
     - If the force is then too stiff for a stable contact, it takes the shortest alpha
@@ -209,7 +219,7 @@ def _root(
 
 
 def _rounded(value: float, *, up: bool = False) -> float:
-    """Rounds a value to three significant figures."""
+    """Rounds a value to three significant figures; with ``up``, never down."""
     step = 10.0 ** (math.floor(math.log10(value)) + 1 - _FIGURES)
     steps = math.ceil(value / step - 1e-9) if up else round(value / step)
     return float(f"{steps * step:.12g}")

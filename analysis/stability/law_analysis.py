@@ -31,7 +31,8 @@ class Study:
     scenario: Scenario
     """The scenario with the law to analyze."""
     full: bool = False
-    """Whether checks by simulation take longer."""
+    """Whether the report is full: simulations that check the results are longer, or
+    there are more of them."""
     found: dict[str, Any] = field(default_factory=dict)
     """Data objects of earlier parts, by key. A part without a result has no entry."""
 
@@ -67,8 +68,6 @@ class Part(Generic[Data]):
     """Returns the linear models that are written to files."""
     notes: Callable[[Data], Sequence[str]] = lambda data: ()
     """Returns notes that readers must know before they use the numbers."""
-    fresh: bool = False
-    """Whether the section begins on a new page of paper."""
 
     def section(self, data: Data) -> Section:
         """Returns the section of the report about a data object."""
@@ -78,14 +77,13 @@ class Part(Generic[Data]):
             self.show(data),
             self.document(data) if self.document else data,
             tuple(criterion.judge(data) for criterion in self.criteria),
-            self.fresh,
         )
 
     def problem(self, text: str, *, failed: bool = False) -> Section:
-        """Returns the section of a part without a result, which states the reason.
+        """Returns the section of a part that has no result.
 
-        ``failed`` states whether the reason is a fault of the program, and not of the
-        law or of the scenario.
+        ``text`` is the reason, which the section states. ``failed`` is true if the
+        reason is a fault of the program, and false if it lies in the law or scenario.
         """
         words = "This part failed" if failed else "Not computed"
         return Section(
@@ -97,7 +95,6 @@ class Part(Generic[Data]):
                 criterion.without_number(f"the part '{self.title}' has no result")
                 for criterion in self.criteria
             ),
-            self.fresh,
         )
 
 
@@ -131,7 +128,10 @@ class LawAnalysis:
         return [verdict for each in self.sections for verdict in each.verdicts]
 
     def fail(self, key: str, error: Exception) -> str:
-        """Notes an unexpected exception of a part, and describes it in one line."""
+        """Records an unexpected exception of a part. Returns a description in one line.
+
+        ``key`` is the key of the part.
+        """
         self.failures[key] = error
         return failure_text(error)
 
@@ -145,11 +145,11 @@ def analyze_law(
 ) -> LawAnalysis:
     """Runs the parts of the stability analysis for the law of a scenario, in order.
 
-    The sensors may be exact or realistic, because each part chooses its own sensors.
-    ``full`` is explained in ``Study``. ``step`` is called with the title of each
-    part before the part runs. If a part has no result, its section states the reason.
-    All parts depend on the first part; therefore every exception of the first part is
-    raised.
+    The scenario may have exact or realistic sensors; each part replaces them as it
+    needs. ``full`` is that of ``Study``. ``step`` is called with the title of each part
+    before the part runs. If a part raises an exception, its section states the reason,
+    and the next part runs. An exception of the first part ends the analysis and is
+    raised, because the other parts depend on the first part.
     """
     analysis = LawAnalysis(scenario, model_sheet(scenario))
     study = Study(scenario, full, analysis.found)

@@ -56,7 +56,8 @@ class OperatingPoints:
 
     search: EquilibriumSearch
     at: OperatingPoint
-    """Stable equilibrium of the models, from ``EquilibriumSearch.follow_point``."""
+    """Stable equilibrium about which the loop is linearized. It is the result of
+    ``EquilibriumSearch.follow_point``."""
     moving: OperatingPoint | None
     """Equilibrium behind a source that moves at constant velocity, if there is one."""
     no_moving: str
@@ -73,7 +74,9 @@ class LinearModels:
     continuous: LinearModel
     sampled: LinearModel
     routes: RouteComparison
+    """Comparison of two independent computations of the sampled model."""
     gradient: GradientCheck
+    """Comparison of AutoDiff with finite differences."""
 
 
 def _operating_points(study: Study) -> OperatingPoints:
@@ -90,9 +93,9 @@ def _operating_points(study: Study) -> OperatingPoints:
 def count_jams(scenario: Scenario, search: EquilibriumSearch) -> int:
     """Counts the places outside the goal where the robot can get stuck.
 
-    Such a place is a stable equilibrium or an attractive switching point. A switching
-    point is a point at which several bodies are equally near. A run that ends at such a
-    place has the outcome "stuck" or "timeout".
+    Such a place is a stable equilibrium or an attractive switching point. At a
+    switching point, several bodies are equally near, and the force on the robot jumps.
+    If a run ends at one of these places, its outcome is "stuck" or "timeout".
     """
     margin = scenario.goal_radius_m - scenario.follower.attraction.follow_distance_m
     p_WS = scenario.source.path().pose(0.0)[:2]
@@ -243,7 +246,7 @@ def _show_models(data: LinearModels) -> list[Content]:
 
 
 def _matrix_table(model: LinearModel, matrix: str) -> Table:
-    """Returns a matrix with the names of its rows and columns; a dot is a zero."""
+    """Returns a matrix as a table with names of rows and columns. A dot is a zero."""
     x, u, y = model.state_names, model.input_names, model.output_names
     rows, columns = {"A": (x, x), "B": (x, u), "C": (y, x), "D": (y, u)}[matrix]
     body: list[list[Cell]] = [
@@ -378,7 +381,6 @@ LINEAR_MODELS = Part[LinearModels](
     ),
     document=_models_document,
     models=lambda data: (data.continuous, data.sampled, data.at.motion),
-    fresh=True,
 )  # fmt: skip
 
 #: A small step, predicted by the linear model and simulated.

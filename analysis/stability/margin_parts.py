@@ -1,4 +1,4 @@
-"""Parts of the stability report about stability margins, and about gains for them."""
+"""Parts of the stability report: stability margins, and gains that meet them."""
 
 from __future__ import annotations
 
@@ -63,9 +63,10 @@ _COLUMNS = {
     "complementary_peak": Column("M_t"),
     "delay_margin_s": Column("delay", "s"),
 }
-#: Source of the usual phase margin and gain margin.
+#: Publication that gives the usual phase margin and gain margin.
 _USUAL = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
-#: Place and direction of the cut loop that represents the implemented loop.
+#: Place and direction of the cut whose margins stand for the whole implemented loop in
+#: the JSON document.
 _MAIN = ("sensor", "along")
 
 
@@ -73,8 +74,8 @@ _MAIN = ("sensor", "along")
 class Margins:
     """Stability margins of the ideal target loop and of the implemented loop.
 
-    The target loop contains the attraction alone, without motor lag, sampling, and
-    obstacles. The implemented loop is the loop of the built diagram.
+    The target loop contains only the attraction. It has no motor lag, no sampling, and
+    no obstacles. The implemented loop is the loop of the block diagram.
     """
 
     target: dict[str, LoopMargins]
@@ -82,15 +83,20 @@ class Margins:
     target_model: LinearModel
     """Linear model of the target loop, cut at the sensor."""
     implemented: tuple[PointMargins, ...]
+    """Margins of the implemented loop, one entry for each place and direction of the
+    cut."""
     gangs: tuple[GangOfFour, ...]
-    """Gang of four of each loop that is cut at the sensor."""
+    """Gang of four (the four sensitivity functions) of each loop that is cut at the
+    sensor."""
     at: OperatingPoint
+    """Operating point of the implemented loop."""
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
-        """Returns the stability margins of one cut, or None if there is no such loop.
+        """Returns the margins of the implemented loop for one cut.
 
-        The cut is at the ``sensor``, at the ``actuator``, or at the ``wheels``. The
+        ``at`` is the place of the cut: ``sensor``, ``actuator``, or ``wheels``. The
         direction of the motion is ``along`` the line to the source, or ``across`` it.
+        The result is None if the implemented loop has no such cut.
         """
         for found in self.implemented:
             if (found.at, found.direction) == (at, direction):
@@ -105,11 +111,12 @@ class Margins:
 
 
 def least_damped(poles: NDArray[np.complex128]) -> complex:
-    """Returns the pole with the least damping ratio among all slow oscillations, 1/s.
+    """Returns the slow oscillating pole with the least damping ratio, 1/s.
 
-    If nothing oscillates slowly, the function returns the pole with the largest real
-    part. Of a conjugate pair, it returns the pole with the positive imaginary part.
-    ``poles`` has the shape (n,) and the unit 1/s (s plane).
+    A pole is slow if its magnitude is below 12 rad/s; faster poles belong to motors and
+    filters. If no slow pole oscillates, the function returns the pole with the largest
+    real part. Of a conjugate pair, it returns the pole with the positive imaginary
+    part. ``poles`` are (n,) poles in the s plane, 1/s.
     """
     slow = poles[np.abs(poles) < _SLOW_RAD_S]
     swinging = slow[np.abs(slow.imag) > 1e-6]
@@ -234,7 +241,11 @@ def _db(factor: float) -> str:
 def margin_criteria(
     loops: Callable[[Data], Sequence[LoopMargins]],
 ) -> tuple[Criterion[Data], ...]:
-    """Returns the criteria for the worst margins over all cuts of a loop."""
+    """Returns criteria for the worst margins over several cut loops.
+
+    ``loops`` is a function from the data object of a part to the margins of these cut
+    loops.
+    """
 
     def worst(
         choose: Callable[[list[float]], float], name: str
@@ -292,7 +303,6 @@ MARGINS = Part[Margins](
     ),
     document=_document,
     models=lambda data: (data.target_model,),
-    fresh=True,
 )  # fmt: skip
 
 

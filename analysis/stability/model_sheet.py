@@ -21,14 +21,14 @@ from systems.laws.catalog import LAWS
 from systems.laws.law import Equation
 from systems.laws.parameters import ImpedanceParameters
 
-#: Parts of a scenario that affect a loop with exact sensors, by kind of robot.
+#: Groups of fields that affect the control loop with exact sensors, by kind of robot.
 _PARTS = {
     "follower": ("attraction", "collision_vector", "robot", "plant", "tracker"),
     "router": ("robot", "plant", "route", "objects"),
     "odor_searcher": ("robot", "plant", "compass", "motor_driver", "search"),
     "sound_searcher": ("robot", "plant", "compass", "motor_driver", "sound_search"),
 }
-#: Fields of these parts that do not affect the loop.
+#: Fields of these groups, and of the group ``sound``, that do not affect the loop.
 _OTHERS = frozenset(
     {
         "robot.microphones_m",
@@ -38,7 +38,8 @@ _OTHERS = frozenset(
         *(f"sound.{name}_hz" for name in ("low", "high", "tone")),
     }
 )
-#: The field that selects which speed of an obstacle a law gets.
+#: The field that selects which speed of an obstacle the law uses: ``printed`` or
+#: ``closing``.
 _VELOCITY_TERM = "collision_vector.velocity_term"
 
 #: Conventions that hold for every law.
@@ -94,13 +95,13 @@ class ParameterRow:
     field: str
     """Path of the parameter in the scenario."""
     part: str
-    """Description of the parameter group, with the source of its values."""
+    """Group of the parameter: the first paragraph of the docstring of its model."""
     value: Any
     """Value in the scenario."""
     changed: bool
     """Whether the value differs from the default."""
     text: str
-    """Symbol, unit, and source, in the words of the parameter model."""
+    """Meaning of the parameter: the docstring of its field in the parameter model."""
 
     @property
     def of_law(self) -> bool:
@@ -113,7 +114,7 @@ class ParameterRow:
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit of the operating envelope."""
+    """A limit within which the linear models are valid, or the robot operates."""
 
     quantity: str
     value: float
@@ -136,7 +137,7 @@ class Latency:
 
 @dataclass(frozen=True)
 class ModelSheet:
-    """The model sheet of a stability report."""
+    """The model sheet of a stability report: what the analysis assumes."""
 
     scenario: str
     """Name of the scenario."""
@@ -161,7 +162,10 @@ class ModelSheet:
         return tuple(dict.fromkeys(row.path for row in self.latencies))
 
     def latency_s(self, path: str) -> float:
-        """Returns the sum of the mean delays from one of ``paths`` to the wheels, s."""
+        """Returns the sum of all mean delays from a measured quantity to the wheels, s.
+
+        ``path`` is one of ``paths``.
+        """
         return sum(row.mean_s for row in self.latencies if row.path == path)
 
 
@@ -375,7 +379,7 @@ def _motion(tick_s: float) -> tuple[Equation, ...]:
 
 
 def _drive(tick_s: float) -> tuple[Equation, Equation]:
-    """Returns the equations from the acceleration to the wheels and to the motion."""
+    """Returns the equations of the wheel command and of the plant."""
     return (
         Equation(
             f"Command, each tick T = {tick_s * 1e3:g} ms",

@@ -42,10 +42,10 @@ from systems.laws.law import Equation
 def stability_document(analyses: Sequence[LawAnalysis]) -> dict[str, Any]:
     """Returns the JSON document of a stability analysis of one or several laws.
 
-    The document of one law has its results as keys at the top level. The document of
-    several laws has the key ``laws`` with one document per law, and the key
-    ``comparison`` with the verdicts side by side. The key ``out`` is None until the
-    files of the report have a directory.
+    For one law, the results are keys at the top level. For several laws, the key
+    ``laws`` has one document per law, and the key ``comparison`` has the verdicts of
+    all laws side by side. The key ``out`` is for the directory of the report's files.
+    It is None in the result; the caller sets it after choosing a directory.
     """
     first = analyses[0].scenario
     common = {
@@ -75,7 +75,7 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
 def stability_text(analyses: Sequence[LawAnalysis]) -> str:
     """Returns the verdicts and the notes of a stability analysis as text."""
     table = verdict_table(analyses)
-    # Texts in plain words are too long for a terminal.
+    # The last column, the verdict in plain words, is too wide for a terminal.
     columns, rows = table.columns[:-1], [row[:-1] for row in table.rows]
     lines = [text(Table(["", *columns[1:]], rows))] if rows else []
     for each in analyses:
@@ -197,11 +197,11 @@ def _law(analysis: LawAnalysis, anchor: str) -> Section:
         f"SHA-256 of the effective scenario: `{sheet.scenario_sha256}`.",
         *(_drawn(analysis, each, f"{anchor}-{each.key}") for each in sections),
     ]
-    return Section(anchor, law_title(analysis.law), contents, fresh=True)
+    return Section(anchor, law_title(analysis.law), contents)
 
 
 def _drawn(analysis: LawAnalysis, section: Section, anchor: str) -> Markup:
-    """Returns a section as HTML; a figure that fails leaves the other sections."""
+    """Returns a section as HTML. If a figure fails, the section states the error."""
     try:
         return html(section, anchor, level=3)
     except Exception as error:  # noqa: BLE001  # the other sections must be shown
@@ -221,11 +221,11 @@ def _verdicts(verdicts: Sequence[Verdict]) -> Section:
             "source": "source",
         },
     )
-    return Section("verdicts", "Verdicts", [table], fresh=True)
+    return Section("verdicts", "Verdicts", [table])
 
 
 def _model(sheet: ModelSheet) -> Section:
-    """Returns the section with the model sheet, which holds for every law."""
+    """Returns the section with the part of the model sheet that all laws share."""
     latencies: list[list[Cell]] = []
     for path in sheet.paths:
         latencies.append([f"From {path} to wheels: {1e3 * sheet.latency_s(path):g} ms"])
@@ -245,7 +245,7 @@ def _model(sheet: ModelSheet) -> Section:
         ),
         Table(["part", Column("mean", "ms"), "remark"], latencies, "Latency budget"),
     ]
-    return Section("model", "Model sheet", contents, fresh=True)
+    return Section("model", "Model sheet", contents)
 
 
 def _equations(formulas: Sequence[Equation]) -> list[Content]:

@@ -25,8 +25,8 @@ from analysis.stability.sampling_parts import (
 )
 from diagrams import Scenario
 
-#: Parts for a robot that follows a sound. The first part is about operating points,
-#: because all others depend on it.
+#: Parts for a robot that follows a sound. ``analyze_law`` treats the first part in a
+#: special way: it finds the operating point, on which the others depend.
 SOUND_PARTS: tuple[Part[Any], ...] = (
     OPERATING_POINTS,
     LINEAR_MODELS,

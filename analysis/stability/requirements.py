@@ -20,9 +20,9 @@ from analysis.loops.radial_law import radial_law
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
-#: A gain may miss its requirement by this share, because gains are rounded.
+#: A number may miss its bound by this share, because gains are rounded.
 _ROUNDING = 0.01
-#: A figure may miss its bound by this share because of floating-point rounding.
+#: A number may miss its bound by this share because of floating-point errors.
 _EXACT = 1e-9
 
 
@@ -53,7 +53,11 @@ class Check:
 
     @property
     def ratio(self) -> float:
-        """How well the requirement is met. At 1, the requirement is just met."""
+        """Value/bound for a lower bound, bound/value for an upper bound.
+
+        The requirement is met if this ratio is at least 1. If the divisor is 0 or less,
+        the ratio is infinite.
+        """
         good, bad = self.value, self.bound
         if not self.at_least:
             good, bad = bad, good
@@ -61,16 +65,19 @@ class Check:
 
     @property
     def met(self) -> bool:
-        """Whether the requirement is met."""
+        """Whether the requirement is met, except for floating-point errors."""
         return self.ratio >= 1.0 - _EXACT
 
     @property
     def acceptable(self) -> bool:
-        """Whether the requirement is met, except for the rounding of gains."""
+        """Whether the requirement is met, or missed by 1 % or less.
+
+        The rounding of gains can cause such a small miss.
+        """
         return self.ratio >= 1.0 - _ROUNDING
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns the fields and the three results for the JSON document."""
+        """Returns the fields and the three properties for the JSON document."""
         results = ("ratio", "met", "acceptable")
         return vars(self) | {name: getattr(self, name) for name in results}
 
@@ -79,8 +86,8 @@ class Check:
 class Requirements:
     """Requirements on the attraction and on the gains of the laws.
 
-    The criteria of the stability report use the same values as thresholds. The first
-    six fields are bounds on the control loop that moves the robot to the follow point.
+    The stability report uses the same values as thresholds of its criteria. The first
+    six fields are bounds for the control loop that moves the robot to the follow point.
     """
 
     damping_ratio: float = 0.4
@@ -98,26 +105,27 @@ class Requirements:
     """Largest offset of a robot at rest due to an echo at the largest sensor range, m.
     The default is equal to the error of hearing at 1 m (Han 2019, tables 1 and 2)."""
     spare_latency_ticks: int = 1
-    """Number of control periods by which echoes may be later than in the model. The
-    motion at an obstacle must still be stable. The model leaves out the travel time of
-    echoes, which is up to 18 ms."""
+    """Number of control periods. The motion in front of an obstacle must be stable even
+    if echoes are later than in the model by this number. The model leaves out the
+    travel time of echoes, which is up to 18 ms."""
     injected_share: float = 0.8
-    """Largest share of the dissipation of D_r that the velocity term may return."""
+    """Largest power that the velocity term of the law may add to the motion, as a share
+    of the power that the damping D_r removes."""
     source_range_m: float = 4.0
     """Largest distance of the source, m (Han 2019, tables 1 and 2)."""
     clearance_m: float = 0.25
     """Least clearance between P and the body of the leader during an overshoot, m."""
 
     def within_goal(self, scenario: Scenario) -> Requirements:
-        """Returns requirements that allow any offset at rest within the goal.
+        """Returns a copy that allows any offset at rest with which P is in the goal.
 
-        The default gains of the laws meet these requirements with the printed
-        attraction. That attraction is too soft for a smaller offset.
+        The default gains of the laws meet these requirements with the attraction of Han
+        2019. This attraction is too soft for the offset that ``REQUIRED`` allows.
         """
         return replace(self, rest_offset_m=scenario.stop.goal_margin_m)
 
     def loop(self) -> Iterator[tuple[str, Requirement]]:
-        """Yields fields of ``GainFigures`` with the requirements on the loop."""
+        """Yields requirements on the loop, each after its field of ``GainFigures``."""
         for field, name, unit in (
             ("damping_ratio", "damping ratio", "1"),
             ("phase_margin_deg", "phase margin", "deg"),
@@ -140,7 +148,7 @@ class LawDesign:
 
     law: str
     gains: dict[str, float]
-    """Gains by field of the parameters of the law."""
+    """All parameters of the law, by field."""
     checks: tuple[Check, ...]
 
     def check(self, name: str) -> Check:
@@ -149,7 +157,7 @@ class LawDesign:
 
     @property
     def acceptable(self) -> bool:
-        """Whether every requirement is met, except for the rounding of gains."""
+        """Whether every check is ``acceptable``: met, or missed by 1 % or less."""
         return all(check.acceptable for check in self.checks)
 
     def to_dict(self) -> dict[str, Any]:
@@ -158,7 +166,10 @@ class LawDesign:
 
 
 def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
-    """Returns a copy with other gains of one law, without validation."""
+    """Returns a copy of a scenario with other gains of one law, without validation.
+
+    ``gains`` are values by field of the law's parameters.
+    """
     parameters = getattr(scenario.follower.laws, law).model_copy(update=gains)
     laws = scenario.follower.laws.model_copy(update={law: parameters})
     return scenario.with_robot(laws=laws)
@@ -167,9 +178,10 @@ def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
 def meters_to_go(scenario: Scenario, requirements: Requirements) -> float:
     """Returns the distance from an obstacle to the follow point behind it, m.
 
-    The obstacle is at the distance rho_0 ahead of the robot, where rho_0 is the reach
-    of the conventional law. At the follow point, the attraction is zero. The source has
-    its largest distance. Raises InputError if the result is not above 0.
+    The source is straight ahead of the robot, at ``requirements.source_range_m``. The
+    follow point is between the robot and the source, at the follow distance from the
+    source. The obstacle is ahead of the robot at the reach rho_0 of the conventional
+    law. Raises InputError if the follow point is not behind the obstacle.
     """
     follow = scenario.follower.attraction.follow_distance_m
     reach = scenario.follower.laws.conventional.reach_m
@@ -184,10 +196,11 @@ def meters_to_go(scenario: Scenario, requirements: Requirements) -> float:
 
 
 def allowed_stiffness(scenario: Scenario, requirements: Requirements) -> float:
-    """Returns the largest stiffness of a law with a stable motion at an obstacle, N/m.
+    """Returns the largest stiffness that a law may have near an obstacle, N/m.
 
-    Echoes are ``spare_latency_ticks`` later than in the model. If the attraction alone
-    is too stiff, the result is negative.
+    With a larger stiffness, the motion in front of an obstacle is unstable if echoes
+    are ``spare_latency_ticks`` later than in the model. If the attraction alone is too
+    stiff, the result is negative.
     """
     total = largest_contact_stiffness(
         scenario, latency_ticks=requirements.spare_latency_ticks

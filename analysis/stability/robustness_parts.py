@@ -24,13 +24,14 @@ from analysis.report.section import Column, Content, Figure, Table
 from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
 
-#: Number of random points in the parameter box, in a short and in a full report.
+#: Number of random points in the parameter box, in a short and in a full report. The
+#: analysis of contact takes four times as many.
 _SAMPLES = (25, 200)
 
 
 @dataclass(frozen=True)
 class LoopRobustness:
-    """Poles of one loop over its box of uncertain parameters."""
+    """Poles of one loop while its uncertain parameters vary within their intervals."""
 
     cloud: PoleCloud
     sensitivities: tuple[PoleSensitivity, ...]
@@ -43,11 +44,11 @@ def loop_robustness(
     *,
     samples: int,
 ) -> LoopRobustness:
-    """Computes the poles of a sampled loop for uncertain parameters.
+    """Computes how the poles of a sampled loop depend on uncertain parameters.
 
     Each uncertain parameter has an interval. All intervals together form a box.
-    ``poles`` takes parameter values and returns the poles of the loop in the z plane;
-    ``samples`` is the number of random points in the box.
+    ``poles`` is a function from parameter values to the poles of the loop in the z
+    plane. ``samples`` is the number of random points in the box.
     """
     return LoopRobustness(
         pole_cloud(
@@ -156,7 +157,6 @@ ROBUSTNESS = Part[LoopRobustness](
         ),
     ),
     document=_document,
-    fresh=True,
 )  # fmt: skip
 
 CONTACT_ROBUSTNESS = Part[LoopRobustness](

@@ -100,7 +100,7 @@ def _show_frozen(data: Sequence[FrozenPoint]) -> list[Content]:
 
 
 def _poles_of(point: FrozenPoint) -> list[str]:
-    """Returns the poles as texts, slowest first; of a conjugate pair only one pole."""
+    """Returns the poles as texts, slowest first. A conjugate pair gives one text."""
     poles = sorted(point.model.s_poles.tolist(), key=lambda pole: -pole.real)
     shown = [pole for pole in poles if pole.imag >= -1e-9]
     return [number(p if abs(p.imag) > 1e-9 else p.real) for p in shown]
@@ -166,7 +166,10 @@ class SpringBounds:
 
     @property
     def share(self) -> float:
-        """Total stiffness over its limit, for positions that are one tick late."""
+        """Total stiffness divided by the largest stable stiffness.
+
+        This limit holds if the springs use positions that are one control period late.
+        """
         bound = self.bounds.stable_today_n_m[-1]
         return self.total_stiffness_n_m / bound if bound > 0.0 else math.inf
 
@@ -254,11 +257,15 @@ GAIN_BOUNDS = Part[SpringBounds](
 
 @dataclass(frozen=True)
 class Adaptation:
-    """Stability of the adaptation, and the stiffness that it learns in a jam."""
+    """Stability of the adaptation of gains, and the stiffness that it reaches in a jam.
+
+    In a jam, a wall holds the robot while the target moves on.
+    """
 
     stability: AdaptationStability
     jam_share: float
-    """Stiffness at the end of a jam relative to its stability limit; NaN if unknown."""
+    """Stiffness K at the end of a jam, divided by the largest stable stiffness. NaN if
+    that limit is unknown."""
 
 
 def _adaptation(study: Study) -> Adaptation:

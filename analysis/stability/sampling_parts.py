@@ -47,7 +47,8 @@ class SampledLoop:
     margins: tuple[DelayMargin, ...]
     """Delay margins, one for each place of the delay and direction of motion."""
     check: DelayCheck | None
-    """Simulations around the delay margin at the sensor; None if it is infinite."""
+    """Simulations with a delay at the sensor just below and just above the margin, for
+    motion along the line to the source. None if this margin is infinite or missing."""
 
     @property
     def least_s(self) -> float:
@@ -57,13 +58,14 @@ class SampledLoop:
 
 @dataclass(frozen=True)
 class BurstCycles:
-    """Stability over cycles of a burst of sound and silence, one result per hold.
+    """Stability of the motion over cycles of a burst of sound and the silence after it.
 
-    A hold is a way in which the robot keeps the target's position in the silence.
+    There is one result for each hold. A hold is a rule for the motion of the target
+    during the silence.
     """
 
     today: str
-    """Hold of the scenario, ``tracker.hold``."""
+    """Hold of the scenario, which is the value of the field ``tracker.hold``."""
     cycles: tuple[BurstCycle, ...]
     runs: tuple[BurstRun, ...]
     """One simulated run per entry of ``cycles``, in the same order."""
@@ -247,10 +249,9 @@ class ContactMode:
 def contact_growth(scenario: Scenario, ticks: int) -> float | None:
     """Returns the growth rate of the motion in front of an obstacle, 1/s.
 
-    The spring to the obstacle has the largest stiffness of the law, and the measured
-    position of the obstacle is some control periods (``ticks``) old. The result is
-    negative if the motion decays. If the law does not push away from obstacles, it is
-    None.
+    The obstacle acts as a spring with the largest stiffness of the law. The measured
+    position of the obstacle is ``ticks`` control periods old. The result is negative if
+    the motion decays. It is None if the law does not push away from obstacles.
     """
     stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:

@@ -1,7 +1,8 @@
-"""Picture of a block diagram that shows the names of all ports and all wires.
+"""Draws a block diagram with all blocks, the names of their ports, and all wires.
 
-The module does not use Graphviz, because its Python packages need system libraries that
-are not installed on every machine.
+A wire is a connection from an output port to an input port. The module does not use
+Graphviz, because the Python packages for Graphviz need system libraries that are not
+installed on every machine.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ FILLS: dict[Stage, str] = {
     "control": "#DDF1E7",
     "robot": "#DCEAF7",
 }
-#: Colors of the wires, dark enough for a white page. All wires from one block have
-#: the same color.
+#: Colors of the wires, which are dark enough for a white page. All wires from one block
+#: have the same color.
 WIRE_COLORS = (
     "#0072B2",
     "#D55E00",
@@ -93,7 +94,8 @@ class _Layout:
     """The boxes and wires of the picture, with their places.
 
     A direct wire joins neighboring columns. All other wires go along the bus, a set of
-    horizontal lines between the two rows of boxes.
+    horizontal lines between the two rows of boxes. The wires from one output port share
+    one line of the bus. The key of this line is (name of the block, name of the port).
     """
 
     boxes: dict[str, _Box]
@@ -110,8 +112,9 @@ def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
 
     The signals go from left to right. Wires to a neighboring column are drawn directly.
     All other wires go along the bus, a set of horizontal lines between the two rows of
-    blocks. The name of an output port is gray if no input port reads it. Logs are left
-    out. If the picture is flat, it shows the blocks inside of a nested diagram.
+    blocks. The name of an output port is gray if no input port reads this output. Logs
+    are left out. If ``flat`` is true, the blocks inside of nested diagrams are drawn.
+    Otherwise, each nested diagram is drawn as one block.
     """
     connections = wires(diagram, flat=flat)
     layout = _arrange(blocks(diagram, flat=flat), connections)
@@ -147,7 +150,7 @@ def _box(block: Any) -> _Box:
     stage: Stage = getattr(block, "stage", "control")
     if isinstance(block, Diagram):
         stage = "robot" if block.HasOutputPort("pose_WB") else "world"
-    elif type(block).__module__.startswith("pydrake."):  # it joins ports
+    elif type(block).__module__.startswith("pydrake."):  # such a block joins ports
         stage = "world"
     return _Box(
         block.get_name(),
@@ -177,14 +180,17 @@ def _arrange(systems: Sequence[Any], connections: Sequence[Wire]) -> _Layout:
 
 
 def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
-    """Assigns each box to a column, after all boxes whose outputs it reads.
+    """Assigns each box to a column.
 
-    Boxes then move to the right, up to the boxes that read their outputs. Wires that
-    close a loop, or that go back to an earlier stage, do not count.
+    A box is to the right of all boxes whose outputs it reads. It is then moved to the
+    right as far as the boxes that read its own outputs permit. Boxes without inputs are
+    not moved. These rules ignore wires that close a loop, and wires to a box of an
+    earlier stage.
     """
     names = list(boxes)
     forward: dict[str, set[str]] = {name: set() for name in boxes}
-    # In each loop, the wires against the order of building count as going back.
+    # Wires to a block that was added to the diagram earlier come last. In each loop,
+    # such a wire is therefore the one that closes the loop.
     against = sorted(
         connections, key=lambda w: names.index(w.source) > names.index(w.target)
     )
@@ -224,7 +230,10 @@ def _set_places(layout: _Layout) -> None:
 
 
 def _stack(boxes: list[_Box], top: float) -> float:
-    """Places boxes below each other in their columns. Returns the lowest edge, px."""
+    """Places boxes below each other in their columns, from the height ``top`` on, px.
+
+    Returns the height of the lowest edge, px.
+    """
     edges: dict[int, float] = {}
     for box in boxes:
         box.y = edges.get(box.column, top)
@@ -233,7 +242,7 @@ def _stack(boxes: list[_Box], top: float) -> float:
 
 
 def _set_tracks(layout: _Layout) -> None:
-    """Sets the x positions of columns and of the vertical parts of bus wires."""
+    """Sets the x of all columns, and the x of the vertical parts of bus wires."""
     gaps: dict[int, list[tuple[str, str]]] = {}
     for key, along in layout.bus.items():
         columns = {layout.boxes[key[0]].column + 1}
@@ -327,8 +336,8 @@ def _text(
 def blocks(diagram: Diagram, *, flat: bool = True) -> list[Any]:
     """Returns the systems of a diagram, except logs, in the order of the diagram.
 
-    A system whose outputs only go to logs is also left out. If the result is flat, a
-    nested diagram is replaced by the systems that it contains.
+    A system whose outputs only go to logs is also left out. If ``flat`` is true, the
+    systems inside of a nested diagram replace this diagram in the result.
     """
     systems = list(_systems(diagram, flat=flat))
     logs = {s.get_name() for s in systems if isinstance(s, VectorLogSink)}
@@ -378,14 +387,22 @@ def _all_wires(diagram: Diagram, *, flat: bool) -> list[Wire]:
 
 
 def _writer(system: Any, index: Any) -> tuple[Any, Any]:
-    """Returns the block and its output port behind an output port of a diagram."""
+    """Returns the block that produces an output, and the index of its output port.
+
+    ``index`` is the output port of ``system``. If ``system`` is a diagram, the block is
+    inside of this diagram.
+    """
     while isinstance(system, Diagram):
         system, index = system.get_output_port_locator(index)
     return system, index
 
 
 def _readers(system: Any, index: Any) -> Iterator[tuple[Any, Any]]:
-    """Yields the blocks and their input ports behind an input port of a diagram."""
+    """Yields the blocks that read an input, each with the index of its input port.
+
+    ``index`` is the input port of ``system``. If ``system`` is a diagram, the blocks
+    are inside of this diagram.
+    """
     if not isinstance(system, Diagram):
         yield system, index
         return

@@ -9,20 +9,21 @@ from systems.sound.parameters import SoundParameters
 
 
 def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
-    """Returns start and end, s, of all bursts of a sound that begin before a time, s.
+    """Returns start and end, s, of the bursts of a sound until the time ``end``, s.
 
-    A burst that lasts longer ends at this time.
+    Bursts that begin later are left out. A burst that lasts beyond ``end`` is cut off
+    at ``end``.
     """
     starts = np.arange(sound.start_s, end, sound.period_s)
     return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
 
 
 def call_time(result: RunResult) -> float | None:
-    """Returns the time, s, at which the sink first received a call, or None.
+    """Returns the time at which a robot begins to call the others, s, or None.
 
-    The sink is the computer of the operator. After a robot has found the odor source,
-    it calls the other robots. The function uses the radio frame with which a robot
-    reports this find to the sink.
+    A robot calls the others after it has found the odor source. The result is the time
+    at which the first report of such a find arrives at the sink, the computer of the
+    operator. It is None if no report arrives.
     """
     times = [
         float(result.time[np.argmax(values > 0.5)])
@@ -35,8 +36,8 @@ def call_time(result: RunResult) -> float | None:
 def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
     """Returns start and end, s, of the bursts of the source that one robot hears.
 
-    If the robot listens to another robot that calls, the bursts begin after the call. A
-    robot that drives to a goal hears no bursts.
+    If the source is a robot that searches for odor, there are bursts only after
+    ``call_time``. A robot that drives to a goal hears no bursts.
     """
     if result.scenario.only.has_goal:
         return []

@@ -42,7 +42,7 @@ class Curve(NamedTuple):
     style: Literal["line", "dashes", "dots", "steps", "mark"] = "line"
     """With ``steps``, each value holds from its time on. ``mark`` is a single point."""
     width: float = 1.5
-    """Width of the line, or half of the size of the dots, in points."""
+    """Width of the line, or half of the size of each dot, in points."""
 
 
 class Shade(NamedTuple):
@@ -55,7 +55,7 @@ class Shade(NamedTuple):
     alpha: float
     """Opacity, 0 to 1."""
     between: tuple[float, float]
-    """Least and greatest value of the shaded area, in the unit of the panel."""
+    """Lower and upper limit of the shaded area, in the unit of the panel."""
 
 
 class Panel(NamedTuple):
@@ -66,14 +66,15 @@ class Panel(NamedTuple):
     """Unit of the quantity. It is empty for a quantity without a unit."""
     curves: list[Curve]
     low: float | None = None
-    """Value at the bottom of the axis. With None, it follows from the curves."""
+    """Value at the bottom of the axis. None: the curves determine this value."""
     high: float | None = None
-    """Value at the top of the axis. With None, it follows from the curves."""
+    """Value at the top of the axis. None: the curves determine this value."""
     rows: tuple[tuple[int, str], ...] = ()
-    """Values on the axis with their names. Without rows, the axis shows numbers."""
+    """Values on the axis, each with a name that replaces the number. Without rows, the
+    axis shows numbers."""
     shades: tuple[Shade, ...] = ()
     instants: tuple[float, ...] = ()
-    """Times of new routes, s."""
+    """Times at which the robot planned a new route, s."""
 
     @property
     def title(self) -> str:
@@ -84,7 +85,8 @@ class Panel(NamedTuple):
     def limits(self) -> tuple[float, float]:
         """Values at the bottom and at the top of the axis.
 
-        Beyond the curves, the axis shows 5 % of their range.
+        An end of the axis that is not set by ``low`` or ``high`` is beyond the curves
+        by 5 % of their range. If ``low`` is above ``high``, values increase downward.
         """
         values = np.concatenate([curve.y for curve in self.curves])
         values = values[np.isfinite(values)]
@@ -99,9 +101,10 @@ class Panel(NamedTuple):
 def panels(result: RunResult, clearance: ArrayLike | None = None) -> list[Panel]:
     """Returns all panels of one robot's picture over time.
 
-    The (n,) clearance is the distance to the nearest body at each tick (control
-    period), m (``analysis.runs.proximity``). Without it, there is no such panel. The
-    function raises an InputError if it does not have one value per tick.
+    ``clearance`` has the distance to the nearest body at each of the n ticks (control
+    periods), m; see ``analysis.runs.proximity``. If it is None, the panel of the
+    clearance is left out. The function raises an InputError if the shape of
+    ``clearance`` is not (n,).
     """
     robot, columns = result.scenario.only, result.columns
     wanted: list[Callable[[RunResult], Panel]]
@@ -129,12 +132,13 @@ def panels(result: RunResult, clearance: ArrayLike | None = None) -> list[Panel]
 def page_charts(
     result: RunResult, clearance: Mapping[str, ArrayLike]
 ) -> list[dict[str, Any]]:
-    """Returns the panels of all robots as plain data for the page of a replay.
+    """Returns the panels of all robots as plain data (charts) for the page of a replay.
 
-    The clearance of ``panels`` is by name of the robot. A robot without an entry has no
-    such chart. Each dictionary has the title, the name of the robot (empty if there is
-    only one robot), the limits and the named values of the vertical axis, the curves,
-    and the bursts that the robot hears. In the curves, None is a gap.
+    ``clearance`` has the clearance of ``panels`` for each robot, by name of the robot.
+    A robot without an entry has no chart of its clearance. Each dictionary is one
+    chart. It has the title, the name of the robot (empty if there is only one robot),
+    the limits and the named values of the vertical axis, the curves, and the bursts
+    that the robot hears. In the curves, None is a gap.
     """
     return [
         {
@@ -189,7 +193,10 @@ def _zero(result: RunResult) -> Curve:
 
 
 def _without_jumps(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Puts a gap where an angle wraps; a line would cross the whole panel there."""
+    """Puts a gap (NaN) where an angle wraps, for example from 180 to -180 deg.
+
+    Without the gap, a line would cross the whole panel.
+    """
     values = degrees.copy()
     values[1:][np.abs(np.diff(values)) > 180.0] = np.nan
     return values
@@ -295,7 +302,7 @@ def _turning(result: RunResult) -> Panel:
 
 
 def _wanted(time: NDArray[np.float64], values: NDArray[np.float64]) -> Curve:
-    """Returns the command of the law, which a guard may reduce."""
+    """Returns the curve of the law's command, which a guard may reduce."""
     return Curve("wanted by the law", time, values, COLORS["law"], "dashes", 1.0)
 
 
@@ -370,7 +377,10 @@ def _search_bearing(result: RunResult) -> Panel:
 def _columns(
     result: RunResult, width: float, *named: tuple[str, str, str]
 ) -> list[Curve]:
-    """Returns columns as curves; ``named`` has name, label and color of each."""
+    """Returns columns of the table as curves.
+
+    ``named`` has the name of each column, its label, and the key of its color.
+    """
     return [
         Curve(label, result.time, result.columns[name], COLORS[color], width=width)
         for name, label, color in named

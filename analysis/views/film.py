@@ -50,7 +50,7 @@ _ORDER = (
 
 #: Kinds of shapes in the legend.
 _NAMED = RobotBody, SourceBody, Box, Estimate, Plume
-#: Markers of positions.
+#: Styles of the shapes that are drawn as a marker at their position.
 _MARKS: dict[type, dict[str, Any]] = {
     Plume: {"marker": "*", "ms": 11},
     Goal: {"marker": "*", "ms": 11},
@@ -60,7 +60,10 @@ _MARKS: dict[type, dict[str, Any]] = {
 
 
 class RunFrames:
-    """Draws a run from above at any time of the run, as in ``plot_trajectory``."""
+    """Draws frames that show a run from above at any time of the run.
+
+    Frames and ``plot_trajectory`` show the same part of the floor in the same colors.
+    """
 
     def __init__(self, result: RunResult) -> None:
         self._result, scene = result, make_scene(result)
@@ -96,7 +99,7 @@ class RunFrames:
     def frames(self, frames_per_s: float) -> Iterator[NDArray[np.uint8]]:
         """Yields the frames of a movie. The last frame shows the end of the run.
 
-        Each frame has (rows, columns, 3) red, green and blue values.
+        Each frame has the shape (rows, columns, 3): red, green and blue, 0 to 255.
         """
         count = max(1, round(self._result.simulated_s * frames_per_s))
         for number in range(count):
@@ -170,9 +173,11 @@ def circles(
     time: float,
     color: str,
 ) -> Iterator[Circle]:
-    """Yields the rings around a loudspeaker at a time, s.
+    """Yields the rings around a loudspeaker that are visible at a time, s.
 
-    The center is in W, m. Each burst has a start and an end, s.
+    During a burst, a new ring leaves the loudspeaker every ``RING_S``. Each ring grows
+    and fades. ``center`` is the position of the loudspeaker in W, m. Each burst has a
+    start and an end, s.
     """
     for start, end in bursts:
         for left in np.arange(0.0, min(time, end) - start, RING_S):

@@ -1,4 +1,8 @@
-"""Divides the changing parts of the floor into a small number of rectangles."""
+"""Divides a map of the floor that changes over time into few rectangles.
+
+The map consists of square cells. Drawing few rectangles takes less memory than drawing
+every cell at every time.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +32,14 @@ def floor_layers(
 ) -> list[FloorLayer]:
     """Groups floor cells by the times at which they appear and disappear.
 
-    The (n, i, j) cells state whether a cell is present at each of the n times of the
-    map. The layers have the order of the times at which they begin, and no two layers
-    overlap at any time. A cell that stays is in only one layer. Therefore all layers
-    together need little more memory than the last state of the floor. If ``whole`` is
-    true, neighboring cells are merged into larger rectangles.
+    ``cells`` has the shape (n, i, j). It states whether cell (i, j) of the map
+    ``known`` is present at each of the n times of this map. The layers are sorted by
+    ``begin``. At any time, a cell is in at most one layer. A cell that stays is in only
+    one layer, so all layers together need little more memory than the last state of the
+    floor. If ``whole`` is true, neighboring cells are merged into larger rectangles.
     """
     count = len(cells)
-    # For each cell that is present: index of the time at which it disappears.
+    # Index of the first time at which a cell that is present now is absent again.
     ends = np.full(cells.shape, count)
     for k in range(count - 2, -1, -1):
         ends[k] = np.where(cells[k + 1], ends[k + 1], k + 1)
@@ -50,16 +54,16 @@ def floor_layers(
 
 
 def merged_cells(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Finds rectangles that together cover each cell of an (i, j) mask exactly once.
+    """Finds rectangles that cover each true cell of an (i, j) mask exactly once.
 
-    A rectangle has four indices: the first i, the i after the last, the first j, and
-    the j after the last.
+    The result has the shape (m, 4). Each rectangle has four indices: the first i, the
+    last i plus 1, the first j, and the last j plus 1.
     """
     wide = cells.shape[0]
     padded = np.pad(cells, ((0, 1), (1, 1))).astype(np.int8)
     growing: dict[tuple[int, int], int] = {}
     found: list[tuple[int, int, int, int]] = []
-    # The last row is empty. All rectangles that still grow end there.
+    # The last row of the padded mask is empty, so all rectangles end before it.
     for i in range(wide + 1):
         edges = np.flatnonzero(np.diff(padded[i]))
         runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
@@ -79,9 +83,10 @@ def _single_cells(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
 def clipped(
     rectangles: NDArray[np.float64], within: tuple[float, float, float, float]
 ) -> NDArray[np.float64]:
-    """Clips (m, 4) rectangles to the inside of another one; outside, nothing remains.
+    """Cuts off the parts of (m, 4) rectangles that are outside of ``within``.
 
-    A rectangle has the least x, greatest x, least y and greatest y, m.
+    The result leaves out rectangles without a part inside of ``within``. Each rectangle
+    has the least x, greatest x, least y and greatest y, m.
     """
     x_low, x_high, y_low, y_high = within
     low, high = [x_low, x_low, y_low, y_low], [x_high, x_high, y_high, y_high]

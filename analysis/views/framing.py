@@ -12,7 +12,7 @@ from diagrams import RunResult
 from diagrams.running.stop_rules import SUCCESSFUL
 from diagrams.scenario.bodies import Path
 
-#: Intervals between times of a picture, s. A reader can count easily with these values.
+#: Possible intervals between the times that a picture shows, s. They are round numbers.
 _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
 
 #: Largest number of characters per line of a title.
@@ -20,14 +20,14 @@ LONGEST_LINE = 80
 
 
 def tick_at(result: RunResult, time: float) -> int:
-    """Returns the number of the tick (control period) nearest to a time, s, from 0."""
+    """Returns the index of the tick (control period) nearest to a time, s."""
     return int(np.argmin(np.abs(result.time - time)))
 
 
 def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
-    """Returns at most ``most`` times, s, at constant intervals from 0 on.
+    """Returns times at constant intervals from 0 to the end of the run, s.
 
-    ``most`` is at least 2.
+    The result has at most ``most`` times. ``most`` must be at least 2.
     """
     end = result.simulated_s
     period = next((p for p in _NICE_PERIODS_S if end / p < most), end / (most - 1))
@@ -35,7 +35,7 @@ def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
 
 
 def run_title(result: RunResult) -> str:
-    """Returns the name, the law and the ending of a run on one line."""
+    """Returns the scenario, the law and the outcome of a run on one line."""
     told = result.several and result.cause not in SUCCESSFUL
     who = f"{result.name} " if told else ""
     scenario = result.full_scenario
@@ -43,19 +43,22 @@ def run_title(result: RunResult) -> str:
 
 
 def picture_title(result: RunResult) -> str:
-    """Returns the title of a picture: ``run_title``, the fault and the duration."""
+    """Returns the title of a picture: ``run_title`` and the duration of the run.
+
+    After a collision, the title also states whose fault the collision was.
+    """
     fault = f" ({result.collision.fault}'s fault)" if result.collision else ""
     title = f"{run_title(result)}{fault} after {result.simulated_s:.1f} s"
     return textwrap.fill(title, LONGEST_LINE)
 
 
 def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
-    """Returns a rectangle that contains all bodies during the whole run.
+    """Returns a rectangle that contains the centers of all bodies during the whole run.
 
     The rectangle has the least x, greatest x, least y and greatest y in the world frame
-    W, m. The margin, m, is around the centers of the bodies. The rectangle includes the
-    walls of the room, if there is a room. It ignores estimated positions, because a
-    large error would enlarge the picture too much.
+    W, m. It extends beyond all centers by ``margin``, m. It includes the walls of the
+    room, if there is a room. It ignores estimated positions, because a large error
+    would enlarge the picture too much.
     """
     scenario, times = result.full_scenario, picture_times(result, most=60)
     centers = [
@@ -76,15 +79,18 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
 
 
 def shown_rectangle(result: RunResult) -> tuple[float, float, float, float]:
-    """Returns the floor that the initial view shows, in the format of ``bounds``."""
+    """Returns the part of the floor that a replay shows first.
+
+    The format is that of ``bounds``.
+    """
     return bounds(result, margin=0.5)
 
 
 def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
-    """Returns the edges of the floor in whole meters, in the format of ``bounds``.
+    """Returns the edges of the floor of a replay in whole meters.
 
-    The floor contains the whole run. It is at least as large as the arena of the
-    scenario.
+    The format is that of ``bounds``. The floor contains the whole run. It is at least
+    as large as the arena of the scenario.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
     width, depth = result.full_scenario.arena_m

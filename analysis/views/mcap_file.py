@@ -41,7 +41,8 @@ _CUBE, _LINE_LIST, _ADD = 1, 5, 0
 #: Width of the edges of a room, m.
 _EDGE_M = 0.03
 _PACKAGES = ("mcap", "mcap_ros2", "rosbags")
-#: Columns of poses, by topic. They become pose messages instead of single numbers.
+#: Columns of a run's table that form a pose, by topic. Each pose becomes one message
+#: instead of three messages with single numbers.
 _POSES = {
     "pose": ("p_WB_x", "p_WB_y", "theta_WB"),
     "pose_estimated": ("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"),
@@ -49,7 +50,7 @@ _POSES = {
 }
 _VELOCITY = ("v_WB_x", "v_WB_y", "omega_WB")
 _ESTIMATE = ("p_WS_estimated_x", "p_WS_estimated_y", "target_valid")
-#: Topic, type of the message, and message.
+#: A message to write: topic, type of the message, and message.
 _Entry = tuple[str, str, Message]
 
 
@@ -139,7 +140,10 @@ def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
 
 
 def _ros_names(names: Iterable[str]) -> dict[str, str]:
-    """Returns valid and unique ROS names: only letters, digits and underscores."""
+    """Returns a unique ROS name for each name.
+
+    A ROS name contains only letters, digits and underscores.
+    """
     found: dict[str, str] = {}
     for name in names:
         plain = _plain(name)
@@ -155,7 +159,7 @@ def _plain(name: str) -> str:
 
 
 def _sensors(robot: Robot, own: Mapping[str, NDArray[np.float64]]) -> list[int]:
-    """Returns the numbers, from 0, of the range sensors with readings in the table."""
+    """Returns the indices of the range sensors whose readings are in the table."""
     count = robot.ultrasonic.count if isinstance(robot, HasRangeSensors) else 0
     return [k for k in range(count) if f"range_{k + 1}" in own]
 
@@ -167,9 +171,10 @@ def _robot_frames(
     tick: int,
     time: float,
 ) -> Iterator[Message]:
-    """Yields the transforms of the robot frame B, of P, and of each range sensor.
+    """Yields the transforms of the frames of the robot, of P, and of each range sensor.
 
-    The x axis of a sensor's frame is the axis of its cone.
+    The frame of the robot is B, with its origin at the axle. The x axis of a sensor's
+    frame is the axis of the sensor's cone.
     """
     base, ahead = f"{name}/base_link", robot.robot.control_point_m
     at = [float(own[key][tick]) for key in _POSES["pose"]]
@@ -218,7 +223,10 @@ def _robot_entries(
 
 
 def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Message:
-    """Returns a range message. Without an echo, the range is infinite."""
+    """Returns a ``Range`` message of sensor ``k``.
+
+    ``distance`` is the measured range, m. It must be infinite if there is no echo.
+    """
     assert isinstance(robot, HasRangeSensors)
     sensor = robot.ultrasonic.sensors[k]
     return _stamped(
@@ -236,7 +244,10 @@ def _range(name: str, k: int, robot: Robot, time: float, distance: float) -> Mes
 def _body_markers(
     bodies: Mapping[str, Thing], room: RoomParameters | None, names: Mapping[str, str]
 ) -> list[Message]:
-    """Returns one ``Marker`` message per body in its frame, and one for the walls."""
+    """Returns ``Marker`` messages: one per body, in the frame of the body.
+
+    If there is a room, one more message has the edges of the room.
+    """
     markers = []
     for name, body in bodies.items():
         frame = names[name]
@@ -262,7 +273,7 @@ def _box(
 
 
 def _edges(room: RoomParameters) -> Message:
-    """Returns a marker with the edges of a room, as pairs of end points."""
+    """Returns a ``Marker`` message with the edges of a room, as pairs of end points."""
     low = np.array([*room.corner, 0.0])
     corners = [low + np.array(room.size_m) * k for k in np.ndindex(2, 2, 2)]
     ends = [
@@ -301,14 +312,17 @@ def _marker(
 
 
 def _stamped(time: float, frame: str, **fields: Any) -> Message:
-    """Returns a message with a header, with the time in s and the name of its frame."""
+    """Returns a message with a header and ``fields``.
+
+    The header has the time, s, and the name of the frame of the message.
+    """
     sec, nanosec = divmod(round(1e9 * time), 10**9)
     stamp = {"sec": sec, "nanosec": nanosec}
     return {"header": {"stamp": stamp, "frame_id": frame}, **fields}
 
 
 def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
-    """Returns a ``Vector3`` or ``Point`` message, in any unit."""
+    """Returns a ``Vector3`` or ``Point`` message. The unit of the values is kept."""
     return {"x": x, "y": y, "z": z}
 
 
@@ -329,7 +343,10 @@ def _stamped_pose(time: float, at: Sequence[float]) -> Message:
 
 
 def _transform(time: float, parent: str, child: str, at: Sequence[float]) -> Message:
-    """Returns a ``TransformStamped`` message with the pose of a child in its parent."""
+    """Returns a ``TransformStamped`` message from a frame ``parent`` to ``child``.
+
+    ``at`` is the pose (x, y, theta) of ``child`` in ``parent``, m and rad.
+    """
     x, y, theta = at
     placed = {"translation": _vector(x, y), "rotation": _turn(theta)}
     return _stamped(time, parent, child_frame_id=child, transform=placed)

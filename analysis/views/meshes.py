@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 class Mesh(NamedTuple):
-    """Triangles."""
+    """A surface of triangles."""
 
     vertices: NDArray[np.float64]
     """(3, n) points x, y, z, m."""
@@ -19,9 +19,10 @@ class Mesh(NamedTuple):
 
 
 def ribbon(points: ArrayLike, z: float, width: float) -> Mesh:
-    """Makes a flat band of a width, m, along (n, 2) points, m, at a height z, m.
+    """Makes a flat band along the (n, 2) ``points``, m.
 
-    Most browsers draw lines only one pixel wide.
+    The band is at the height z, m, and has the given width, m. It replaces a line,
+    because most browsers draw lines only one pixel wide.
     """
     middle = np.asarray(points, dtype=float)
     along = np.gradient(middle, axis=0)
@@ -35,22 +36,26 @@ def ribbon(points: ArrayLike, z: float, width: float) -> Mesh:
 
 
 def circle(radius: float, z: float, width: float) -> Mesh:
-    """Makes a flat ring around the origin, at a height, m."""
+    """Makes a flat ring around the origin, at the height z. All sizes are in m."""
     turns = np.linspace(0.0, 2.0 * math.pi, 73)
     return ribbon(radius * np.column_stack([np.cos(turns), np.sin(turns)]), z, width)
 
 
 def star(radius: float, z: float, width: float) -> Mesh:
-    """Makes the outline of a star around the origin, at a height, m."""
+    """Makes the outline of a star around the origin, at the height z.
+
+    ``radius`` is the distance of the five points of the star from the origin. All sizes
+    are in m.
+    """
     turns = np.pi * (0.5 + np.arange(11) / 5.0)
     reach = radius * np.where(np.arange(11) % 2, 0.45, 1.0)[:, None]
     return ribbon(reach * np.column_stack([np.cos(turns), np.sin(turns)]), z, width)
 
 
 def rectangles(edges: NDArray[np.float64], z: float) -> Mesh:
-    """Makes flat rectangles at a height z, m.
+    """Makes flat rectangles at the height z, m.
 
-    The (m, 4) edges are least x, greatest x, least y and greatest y, m.
+    ``edges`` has the shape (m, 4): least x, greatest x, least y and greatest y, m.
     """
     x_low, x_high, y_low, y_high = np.asarray(edges, dtype=float).T
     x = np.column_stack([x_low, x_high, x_high, x_low]).ravel()
@@ -62,7 +67,8 @@ def rectangles(edges: NDArray[np.float64], z: float) -> Mesh:
 
 def arrow() -> Mesh:
     """Makes a flat arrow of 1 m length along x."""
-    # Halves of the widths of the shaft and of the head, and the start of the head.
+    # Half of the width of the shaft, half of the width of the head, and x at which the
+    # head begins, m.
     shaft, head, neck = 0.02, 0.055, 0.75
     x = [0.0, neck, neck, 0.0, neck, 1.0, neck]
     y = [-shaft, -shaft, shaft, shaft, -head, 0.0, head]

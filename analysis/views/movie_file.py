@@ -1,6 +1,6 @@
 """Encodes movies as GIF files with Pillow, or as MP4 files with ffmpeg.
 
-A file appears only after its encoding is complete.
+The file of a movie appears only after the whole movie is encoded.
 """
 
 from __future__ import annotations
@@ -27,10 +27,12 @@ _CODECS = ("libx264", "aac")
 
 
 class MovieFile:
-    """Output file of a movie, which ends in .gif or .mp4 and must not exist.
+    """Output file of a movie.
 
-    The constructor raises an InputError if the file cannot be written, or if no encoder
-    is installed. The directory of the file must exist.
+    The name of the file must end in .gif or .mp4. The file must not exist, but its
+    directory must. The constructor raises an InputError if one of these conditions does
+    not hold, if the directory is not writable, or if an MP4 file needs an encoder that
+    is not installed.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -62,10 +64,11 @@ class MovieFile:
     ) -> None:
         """Encodes frames of equal size, and writes the file.
 
-        A frame has (rows, columns, 3) red, green and blue values. The sound file has
-        one channel per microphone, the leftmost microphone first. The two outer
-        microphones become the left and the right channel. The function raises a
-        RunError if the encoder fails, or if the file cannot be written.
+        Each frame has the shape (rows, columns, 3): red, green and blue, 0 to 255.
+        ``sound`` is a sound file with one channel per microphone, the leftmost
+        microphone first. An MP4 file gets the two outer microphones as left and right
+        channel. A GIF file has no sound. The function raises a RunError if the encoder
+        fails, or if the file cannot be written.
         """
         handle, partial = tempfile.mkstemp(
             prefix=".movie.", suffix=self.path.suffix, dir=self.path.parent
@@ -138,7 +141,7 @@ class MovieFile:
 
 
 def _stereo(sound: Path) -> str:
-    """Returns an ffmpeg filter that makes loud stereo from the outer microphones."""
+    """Returns an ffmpeg filter that makes loud stereo sound from outer microphones."""
     import soundfile
 
     last = soundfile.info(sound).channels - 1

@@ -1,4 +1,8 @@
-"""Makes things of a run that only its replay shows: forces, guards, lamps and gains."""
+"""Makes the things that only the replay of a run shows.
+
+They are forces, commands of the laws, discs of the safety guards, tracks of moving
+bodies, lamps and gains.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +22,10 @@ from diagrams import RunResult
 from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
 from systems.world.geometry import rotate
 
-#: Rate at which arrows are recorded, 1/s. The browser interpolates between these times.
+#: Rate at which arrows are recorded, 1/s. The browser interpolates in between.
 ARROWS_PER_S = 8.0
-#: Lengths of arrows, m. ``LONGEST_M``: arrow of the greatest force.
-#: ``SHORTEST_M``: shortest arrow.
+#: Lengths of arrows, m. ``LONGEST_M``: largest length of the arrow for the greatest
+#: force (see ``scale_m_n``). ``SHORTEST_M``: length of the shortest arrow.
 LONGEST_M, SHORTEST_M = 0.8, 1e-3
 #: Height of the arrows, m. They are above the microphones.
 ARROW_HEIGHT_M = 0.36
@@ -29,8 +33,8 @@ ARROW_HEIGHT_M = 0.36
 LEAST_EXISTS = 0.3
 #: Radii of the rings around tracked bodies, m.
 TRACKED_M = (0.1, 0.2, 0.4, 0.8)
-#: Edges of the guarded disc: name, key of the color, and actions of the guard for which
-#: the edge is visible.
+#: The edge of the disc that a guard keeps free has one color for each group of actions
+#: of the guard: name, key of the color, and actions.
 _EDGES = (
     ("passed", "passed", (PASSED,)),
     ("lessened", "lessened", (SLOWED, TURNED)),
@@ -61,11 +65,11 @@ _BAR_M, _MOST_HIGH = 0.15, 10.0
 
 
 class Frame(NamedTuple):
-    """Carries other things, and is invisible itself."""
+    """An invisible thing that carries other things."""
 
 
 class Arrow(NamedTuple):
-    """A flat arrow of 1 m length along x."""
+    """A flat arrow along x that is 1 m long."""
 
 
 class Circle(NamedTuple):
@@ -75,7 +79,7 @@ class Circle(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """An upright bar of 1 m height."""
+    """An upright bar that is 1 m high."""
 
 
 class Ball(NamedTuple):
@@ -91,7 +95,10 @@ class Disc(NamedTuple):
 
 
 def overlays(scene: Scene, times: NDArray[np.float64]) -> list[Layer]:
-    """Makes the layers that only a replay shows, for the times of its frames, s."""
+    """Makes the layers that only a replay shows.
+
+    ``times`` are the (n,) times of the frames of the replay, s.
+    """
     return [
         *_laws(scene),
         *_guards(scene),
@@ -102,11 +109,11 @@ def overlays(scene: Scene, times: NDArray[np.float64]) -> list[Layer]:
 
 
 def scale_m_n(result: RunResult) -> float | None:
-    """Returns the length, m, of an arrow for a force of 1 N: 1, 2 or 5 times 10^k.
+    """Returns the length, m, of an arrow for a force of 1 N.
 
-    With this length, the arrow of the greatest force is at most 0.8 m long. The
-    greatest force is the 99th percentile of all forces in the run. The length is None
-    if no control law logs its forces.
+    The result is the largest value of the form 1, 2 or 5 times 10^k with which the
+    arrow of the greatest force is at most 0.8 m long. The greatest force is the 99th
+    percentile of all forces in the run. The result is None if no law logs its forces.
     """
     sizes = [
         np.hypot(*own.vector(name))
@@ -125,7 +132,8 @@ def scale_m_n(result: RunResult) -> float | None:
 def commanded_velocity(own: RunResult) -> NDArray[np.float64]:
     """Returns the velocity of P that the wheel commands of one robot would cause.
 
-    P is the control point. The result has the shape (n, 2), in W, m/s.
+    P is the control point. The result has the shape (n, 2): x and y in W at each tick
+    (control period), m/s.
     """
     robot, theta = own.scenario.only.robot, own.columns["theta_WB"]
     left = robot.wheel_radius_m * own.columns["wheel_speed_left"]
@@ -135,7 +143,11 @@ def commanded_velocity(own: RunResult) -> NDArray[np.float64]:
 
 
 def _laws(scene: Scene) -> Iterator[Layer]:
-    """Yields the arrows of forces, and of the distance that P would move in 1 s."""
+    """Yields a layer with the forces on P, and a layer with the command of the law.
+
+    An arrow shows how far P would move in 1 s at the command. A circle around the
+    source shows the follow distance.
+    """
     result, forces, laws = scene.result, [], []
     m_per_n, meaning = scale_m_n(result), "path of 1 s at the command"
     for name, own in result.robots.items():
@@ -164,7 +176,11 @@ def _laws(scene: Scene) -> Iterator[Layer]:
 def _arrow(
     path: str, own: RunResult, vectors: NDArray[np.float64], role: str, number: int
 ) -> Thing:
-    """Makes an arrow that begins at P; ``vectors`` are at the ticks, m."""
+    """Makes an arrow that begins at P.
+
+    ``vectors`` are the (n, 2) vectors of the arrow at the ticks, in W, m. ``number``
+    counts the arrows of a robot, and sets the height of the arrow.
+    """
     end = own.simulated_s
     times = np.unique([*np.arange(0.0, end, 1.0 / ARROWS_PER_S), end])
     ticks = np.abs(own.time[:, None] - times).argmin(axis=0)
@@ -187,7 +203,12 @@ def _arrow(
 
 
 def _guards(scene: Scene) -> Iterator[Layer]:
-    """Yields the edge of the disc that each guard keeps free where the robot stops."""
+    """Yields a layer with one disc per guard.
+
+    The disc is at the pose at which the robot would come to rest if it braked now. The
+    guard keeps this disc in free space. The color of its edge shows the action of the
+    guard.
+    """
     things = []
     for name, own in scene.result.robots.items():
         motion = guarded_motion(own)
@@ -212,7 +233,11 @@ def _guards(scene: Scene) -> Iterator[Layer]:
 
 
 def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
-    """Yields a ring per tracked body; its radius is the uncertainty of the position."""
+    """Yields a layer with a ring for each body that a robot tracks as moving.
+
+    The radius of the ring shows the uncertainty of the position. It is one of
+    ``TRACKED_M``.
+    """
     things, color, plans = [], COLORS["tracked"], False
     for name, own in scene.result.robots.items():
         tracked = tracked_bodies(own, times)
@@ -249,7 +274,11 @@ def _tracked(scene: Scene, times: ArrayLike) -> Iterator[Layer]:
 
 
 def _lamps(scene: Scene) -> Iterator[Layer]:
-    """Yields a lamp above each searcher, and flashes for radio frames at the sink."""
+    """Yields a layer with a lamp above each robot that searches.
+
+    The color of the lamp shows what the robot does. Above the lamp, a white ball
+    flashes when a radio frame of the robot arrives at the sink.
+    """
     things = []
     for name, own in scene.result.robots.items():
         if own.scenario.only.searches is None:
@@ -289,7 +318,10 @@ def _lamps(scene: Scene) -> Iterator[Layer]:
 
 
 def _gains(scene: Scene) -> Iterator[Layer]:
-    """Yields one bar per adapted gain; its height is relative to the initial gain."""
+    """Yields a layer with one bar for each gain of a robot on a route.
+
+    The height of a bar is proportional to the gain divided by its initial value.
+    """
     things = []
     for name, own in scene.result.robots.items():
         if own.scenario.only.kind != "router":

@@ -48,8 +48,8 @@ from systems.world.geometry import rectangle_corners
 WIDTH_IN = 8.0
 #: Space around the map for labels, title and legend, inch.
 LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.5
-#: Least distance that a robot or a source moves between two drawn times, m. For
-#: obstacles, half of this distance applies.
+#: Robots and sources are drawn at times between which they move by at least this
+#: distance, m. For obstacles, half of this distance is enough.
 APART_M = 0.25
 #: Largest number of times at which the cones are drawn.
 CONE_INSTANTS = 4
@@ -58,10 +58,10 @@ CONE_INSTANTS = 4
 def plot_trajectory(result: RunResult) -> Figure:
     """Draws the run from above at a few times, in the world frame W.
 
-    With ideal obstacle sensing, there are no cones. For a robot with a safety guard,
-    the floor that the robot knew at the end replaces the cones. Crosses show the source
-    positions that the robot estimated. Early estimates are faint, and late estimates
-    are strong.
+    The picture shows the cones of the range sensors, except with ideal obstacle
+    sensing. For a robot with a safety guard, the picture shows the floor that the robot
+    knew at the end instead of the cones. Crosses show the source positions that the
+    robot estimated. Early estimates are faint, and late estimates are strong.
     """
     figure, axes = map_axes(result)
     draw_grid(axes)
@@ -82,10 +82,10 @@ def plot_trajectory(result: RunResult) -> Figure:
 
 
 def map_axes(result: RunResult) -> tuple[Figure, Axes]:
-    """Makes axes in W, m, with equal scales for all bodies, and space for a legend.
+    """Makes a figure with axes in W, m, that show all bodies, and space for a legend.
 
-    The aspect ratio of the axes is limited. If necessary, the axes show more of the
-    floor.
+    The axes have equal scales. The height of the axes is 0.4 to 1.3 times their width;
+    if necessary, they show more of the floor than the bodies need.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
     width = WIDTH_IN - LEFT_IN - RIGHT_IN
@@ -111,7 +111,8 @@ def draw_scene(axes: Axes, scene: Scene, *, ends_only: bool = False) -> None:
     """Draws a run from above into axes in the world frame W, m.
 
     If ``ends_only`` is true, robots are drawn only at the start and at the end of the
-    run. Then the picture shows neither what the robots sensed nor the odor.
+    run, and everything that robots sense is left out: cones, known floor, odor, and
+    estimates.
     """
     painter = _Painter(axes, scene, ends_only)
     for kind, draw in _DRAW.items():
@@ -134,12 +135,15 @@ class _Painter:
 
     @cached_property
     def mapping(self) -> set[str]:
-        """Names of the robots with a map of the floor."""
+        """Names of the robots whose known floor is drawn."""
         shapes = [thing.shape for thing in self.scene.things]
         return {each.own.name for each in shapes if isinstance(each, KnownFloor)}
 
     def once(self, label: str) -> str | None:
-        """Returns a label for the first of several equal objects, and then None."""
+        """Returns a label at its first use, and None at each later use.
+
+        Several objects with the same label thus have only one entry in the legend.
+        """
         if not label or label in self.labeled:
             return None
         self.labeled.add(label)
@@ -148,8 +152,8 @@ class _Painter:
     def times_of(self, robot: Thing) -> list[float]:
         """Returns the times at which the picture shows the outline of a robot, s.
 
-        Between two of these times, the robot moves by at least 0.25 m. The last time is
-        the end of the run, even if the robot has moved less.
+        Between consecutive times, the robot moves by at least 0.25 m. The last time is
+        always the end of the run, even if the robot has moved less by then.
         """
         end = self.result.simulated_s
         if self.ends_only:
@@ -160,7 +164,11 @@ class _Painter:
         return [*kept, end] if end > kept[-1] else kept
 
     def apart(self, thing: Thing, times: ArrayLike, least_m: float) -> list[float]:
-        """Selects times between which a thing moves by a least distance, m."""
+        """Selects some of the ``times``, s, so that drawings of a thing are apart.
+
+        The first time is always selected. Each later time is selected if the thing is
+        at least ``least_m``, m, from its position at the last selected time.
+        """
         kept: list[float] = []
         for time in np.asarray(times, dtype=float).tolist():
             if not kept or self._moved(thing, kept[-1], time) >= least_m:
@@ -175,12 +183,18 @@ class _Painter:
         self.axes.add_patch(Polygon(rectangle_corners(rectangle), **style))
 
     def time(self, rectangle: ArrayLike, time: float, color: str) -> None:
-        """Writes the time beside a body, on its right until all labels are apart."""
+        """Writes the time at the right side of a body.
+
+        ``spread_labels`` later moves labels that overlap.
+        """
         text = f"{round(time, 1):g} s"
         self.axes.add_artist(BodyLabel(text, np.asarray(rectangle), color))
 
     def cones(self, thing: Thing, shape: Cone) -> None:
-        """Draws a cone at several times, up to the range readings."""
+        """Draws the cone of a range sensor at several times.
+
+        At each time, the length of the cone is the range reading.
+        """
         robot = thing.parent
         if robot is None or robot.name in self.mapping:
             return  # the map replaces the cones, which would hide the map
@@ -301,7 +315,11 @@ class _Painter:
         )
 
     def source(self, thing: Thing, shape: SourceBody) -> None:
-        """Draws a source at both ends of its path, and dots with the times between."""
+        """Draws the body of a source at both ends of its path.
+
+        Dots show its positions in between, with the times. A source without a body is a
+        single mark.
+        """
         color = thing.color
         if not shape.is_body:
             style: dict[str, Any] = {"ls": "none", "ms": 6, "zorder": 4}
@@ -414,5 +432,5 @@ _DRAW: dict[type, Callable[[_Painter, Thing, Any], None]] = {
     Touched: _Painter.hit,
     Contact: _Painter.contact,
 }
-#: Kinds of shapes that a picture of both ends of a run leaves out.
+#: Kinds of shapes that ``draw_scene`` leaves out if ``ends_only`` is true.
 _SENSED = Cone, KnownFloor, Plume, Estimate

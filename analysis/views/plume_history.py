@@ -1,7 +1,7 @@
 """Recomputes the odor plume of a run for pictures.
 
-The plume does not depend on the robots. Therefore the scenario is sufficient for this
-computation.
+The log of a run does not contain the plume. The plume does not depend on the robots, so
+the scenario is sufficient to compute the plume again.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ class PlumeInstant(NamedTuple):
 
 
 def plume_history(scenario: Scenario, end_s: float) -> Iterator[PlumeInstant]:
-    """Yields the ports ``wind`` and ``plume`` of a run every 0.1 s, from 0 on.
+    """Yields the values of the ports ``wind`` and ``plume`` every 0.1 s, from 0 on.
 
-    If the scenario has no plume, there are no instants.
+    They are equal to the values in a run of the scenario until ``end_s``, s. If the
+    scenario has no plume, the result is empty.
     """
     blocks = world_blocks(scenario, world_seeds(scenario))
     if "plume" not in blocks:
@@ -42,7 +43,7 @@ def plume_history(scenario: Scenario, end_s: float) -> Iterator[PlumeInstant]:
     for tick in range(int(end_s / scenario.tick_s + 1e-9) + 1):
         if tick % wind_step.numbers.period == 0:
             yield PlumeInstant(tick * scenario.tick_s, wind.copy(), plume.copy())
-        # As in a run, the plume uses the wind from before this tick.
+        # As in a run, the plume reads the wind from before the update of this tick.
         before = wind.copy()
         wind_step.step(tick, wind, (), (), wind_step.numbers)
         plume_step.step(tick, plume, (before,), (), plume_step.numbers)
@@ -51,8 +52,9 @@ def plume_history(scenario: Scenario, end_s: float) -> Iterator[PlumeInstant]:
 def concentration_map(
     plume: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Computes the (m, n) concentrations of the odor at (n,) x and (m,) y in W, m.
+    """Computes concentrations of the odor on a grid with (n,) x and (m,) y in W, m.
 
-    The unit of the concentration is C1, the constant of the gas sensors.
+    ``plume`` is the value of the port ``plume``. The result has the shape (m, n). Its
+    unit is C1, the constant of the gas sensors.
     """
     return np.array([[concentration(plume, u, v) for u in x] for v in y])

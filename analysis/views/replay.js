@@ -1,5 +1,5 @@
-// Clock, switches, names and curves round Meshcat's scene. `viewer` and `MeshCat` are
-// Meshcat's; `facts` is written by replay_page.py.
+// Adds a clock, switches, names and curves to Meshcat's scene. Meshcat defines `viewer`
+// and `MeshCat`. The function `replay_page` in Python writes the data `facts`.
 "use strict";
 (() => {
   const facts = JSON.parse(document.getElementById("replay-facts").textContent);
@@ -61,7 +61,7 @@
 
   // Viewport ---------------------------------------------------------------
   const THREE = MeshCat.THREE;
-  // Meshcat turns W so that z is up on the screen.
+  // Converts a point in W to the frame of three.js, in which y is up.
   const screen = (x, y, z) => new THREE.Vector3(x, z, -y);
   const [xLow, xHigh, yLow, yHigh] = facts.bounds_m;
   const corners = [xLow, xHigh].flatMap((x) => [yLow, yHigh].flatMap(
@@ -77,7 +77,8 @@
     viewer.controls.update();
     viewer.set_dirty();
   }
-  // The least distance along a direction from which every corner is in view.
+  // Places the camera in a direction from the middle of the floor, at the least distance
+  // from which every corner is in view.
   function fit(direction) {
     let near = 0.5, far = 90;
     for (let k = 0; k < 40; k++) {
@@ -138,7 +139,8 @@
   let namesOn = true;
 
   // Switches ---------------------------------------------------------------
-  // Layers of three.js, since the recording itself switches what is visible.
+  // Uses the layers of three.js to hide objects, because the recording itself changes
+  // their property "visible".
   function setLayer(paths, on) {
     for (const path of paths)
       node(path).object.traverse((part) => part.layers.set(on ? 0 : 1));
@@ -279,9 +281,10 @@
     viewer.animator.play();
     viewer.animator.pause();
     ready = true;
-    // Meshcat's mapping grays the white floor, from which colors then stand out less.
+    // With Meshcat's tone mapping, the white floor would be gray, and colors would have
+    // less contrast.
     viewer.renderer.toneMapping = THREE.NoToneMapping;
-    // Meshcat's 75 degrees bend what is near the edge.
+    // With Meshcat's field of view of 75 degrees, objects near the edge look distorted.
     viewer.camera.fov = 45;
     viewer.set_3d_pane_size();
     document.querySelectorAll("aside input").forEach((box) => box.apply());

@@ -1,4 +1,4 @@
-"""Writes a run as an HTML page that plays the run in a browser, without other files."""
+"""Writes a run as one HTML file that plays the run in a browser."""
 
 from __future__ import annotations
 
@@ -64,25 +64,27 @@ from systems.odor.parameters import CONTAINER_M
 FRAMES_PER_S = 32.0
 #: Duration of one piece of a trail, s.
 TRAIL_PIECE_S = 0.5
-#: Radii of the rings of a source, m. While the source sounds, they appear in turn.
+#: Radii of the rings around a source, m. While the source sounds, one ring after the
+#: other is visible.
 RINGS_M = (0.28, 0.38, 0.48, 0.58, 0.68)
-#: Time for which each ring of a source is visible, s.
+#: Time for which one ring of a source is visible, s.
 RING_S = 0.0625
-#: Interval between two displays of the floor that a robot knows, s.
+#: Interval between two updates of the floor that a robot knows, s.
 KNOWN_PERIOD_S = 0.5
-#: Number of ticks (control periods) in which a map enters its first readings.
+#: Number of ticks (control periods) after which a map contains its first readings.
 FIRST_TICKS = 3
-#: Largest number of cells of all displayed maps together.
+#: Largest number of cells of all displayed states of one map together.
 MOST_CELLS = 30_000_000
 #: Heights and sizes of the details of a robot, m.
 _MICROPHONE_HEIGHT_M, _SENSOR_HEIGHT_M, _WHEEL_WIDTH_M = 0.30, 0.14, 0.035
-#: Width of the body divided by the width of the microphone bar, which is wider.
+#: Width of the drawn body divided by the width of the robot. The microphone bar has the
+#: full width of the robot.
 _BODY_WIDTH_FRACTION = 0.45
 #: Length of the cones, m. A cone of the full range, 3 m, would hide the scene.
 _CONE_M = 0.8
-#: Display of the plume. ``_PUFFS_S``: interval between two displays, s. ``_DISCS``:
-#: number of discs, from the source downwind. ``_APART_M``: difference between the
-#: distances of two discs from the source, m.
+#: Display of the plume by discs. ``_PUFFS_S``: interval between two updates, s.
+#: ``_DISCS``: number of discs. ``_APART_M``: difference between the distances of two
+#: consecutive discs from the source, m.
 _PUFFS_S, _DISCS, _APART_M = 0.5, 30, 0.15
 
 
@@ -94,7 +96,8 @@ def write_replay(
     """Writes a self-contained page that plays the run in three dimensions.
 
     docs/runs.md and docs/searches.md explain what the page shows. ``clearance`` has the
-    distances of ``page_charts``. The page needs a browser with WebGL, but no network.
+    (n,) distances to the nearest body at the ticks, m, by name of the robot. The page
+    needs a browser with WebGL, but no network.
     """
     scene = make_scene(result)
     layers = [*scene.layers, *overlays(scene, frame_times(result))]
@@ -124,7 +127,10 @@ def record(meshcat: Meshcat, scene: Scene, things: Iterable[Thing]) -> None:
 
 @contextmanager
 def _quiet_drake() -> Iterator[None]:
-    """Suppresses Drake's message with the address of a server that no user needs."""
+    """Suppresses the message in which Drake prints the address of Meshcat's server.
+
+    No user needs this server, because the page is a file.
+    """
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.WARNING)
@@ -142,9 +148,11 @@ def frame_times(result: RunResult) -> NDArray[np.float64]:
 def wheel_angles(
     robot: RobotParameters, path: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """Returns the (n,) angles of both wheels for rolling without slip, rad, by side.
+    """Returns the angles of both wheels along a path, rad, by side.
 
-    The path consists of (n, 3) poses (x, y, theta) of the robot in W, m and rad.
+    The wheels roll without slip. ``path`` has the (n, 3) poses (x, y, theta) of the
+    robot in W, m and rad. For each side, ``left`` and ``right``, the result has (n,)
+    angles, from 0 on.
     """
     theta = np.unwrap(path[:, 2])
     between = 0.5 * (theta[1:] + theta[:-1])
@@ -158,9 +166,9 @@ def wheel_angles(
 
 
 def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
-    """Returns which ring of a source is visible at a time, s, as an index.
+    """Returns the index in ``RINGS_M`` of the ring that is visible at a time, s.
 
-    While the source sounds, its rings appear one after the other. The value is None if
+    While the source sounds, one ring after the other is visible. The result is None if
     the source is silent. Each burst has a start and an end, s.
     """
     for start, end in bursts:
@@ -172,8 +180,9 @@ def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
 def known_times(result: RunResult) -> list[float]:
     """Returns the times at which the replay updates the floor that a robot knows, s.
 
-    The interval is 0.5 s. If the map has many cells, the interval is longer. Then all
-    displayed maps together have at most about ``MOST_CELLS`` cells.
+    The interval between the times is 0.5 s. For a map with many cells, the interval is
+    longer, so that all displayed states of the map together have at most about
+    ``MOST_CELLS`` cells.
     """
     end, scenario = result.simulated_s, result.scenario
     most = max(2, MOST_CELLS // scenario.follower.own_map.cells**2)
@@ -216,7 +225,11 @@ class _Recorder:
         place: RigidTransform | None = None,
         alpha: float = 1.0,
     ) -> None:
-        """Adds an object at a pose in the frame of its parent in the scene tree."""
+        """Adds an object to the scene of Meshcat.
+
+        ``path`` is its path in the scene tree. ``place`` is its pose in the frame of
+        its parent in this tree. With None, the pose is not set.
+        """
         rgba = Rgba(*to_rgb(color), alpha)
         if isinstance(shape, Mesh):
             vertices: Any = np.asfortranarray(shape.vertices)
@@ -228,9 +241,10 @@ class _Recorder:
             self.meshcat.SetTransform(path, place)
 
     def switch(self, path: str, times: Iterable[float], states: Iterable[bool]) -> None:
-        """Records the visibility of an object each time that it changes.
+        """Records each change of the visibility of an object.
 
-        The first state counts from 0 s on.
+        ``states`` are the visibilities at ``times``, s. The first state also holds from
+        0 s until the first time.
         """
         last: bool | None = None
         for time, state in zip(times, states, strict=True):
@@ -259,7 +273,7 @@ class _Recorder:
                     self.meshcat.SetProperty(path, "scale", scale.tolist(), at)
 
     def _keys(self, thing: Thing) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Returns times and poses between which the browser interpolates."""
+        """Returns the times and poses between which the browser interpolates."""
         times, poses = thing.times, thing.poses
         if not thing.jumps:
             times, poses = self._at_frames(thing, poses)
@@ -271,14 +285,19 @@ class _Recorder:
         again = np.r_[False, seen[1:] & seen[:-1]]
         again[1:] &= np.isclose(poses[1:], poses[:-1]).all(axis=1)
         new = seen & ~again
-        # Before each jump, a key keeps the object at rest until then.
+        # The last pose before each jump is recorded again, so that the object rests
+        # until the jump.
         before = np.r_[new[1:] & seen[:-1], False]
         return times[new | before], poses[new | before]
 
     def _at_frames(
         self, thing: Thing, values: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Returns times and (n, 3) values, at most one per frame of the replay."""
+        """Returns (n,) times and (n, 3) values, with at most one time per frame.
+
+        If a thing has more times than the replay has frames, the values are
+        interpolated at the frames.
+        """
         if len(thing.times) <= len(self.frames):
             return thing.times, values
         smooth = values.copy()
@@ -381,7 +400,7 @@ class _Recorder:
             self.put(f"{thing.path}/wall_{number}", wall, thing.color, place)
 
     def _cone(self, thing: Thing, shape: Cone) -> None:
-        """Adds two cones of different colors, of which one is visible at a time."""
+        """Adds a cone for times with an echo, and another cone for all other times."""
         x, y, axis = thing.poses[0]
         # The axis of Meshcat's cone is z. The rotations tilt the cone forward, and then
         # turn it to the axis of the sensor.
@@ -408,7 +427,7 @@ class _Recorder:
             self.switch(path, times, seen)
 
     def _trail(self, thing: Thing, shape: Trail) -> None:
-        """Adds the pieces of a trail; each appears when the body has driven along."""
+        """Adds the pieces of a trail. A piece appears when the body reaches its end."""
         z, width = (0.005, 0.015) if shape.line == ":" else (0.008, 0.03)
         points = thing.poses[:, :2]
         step = max(1, round(TRAIL_PIECE_S / self.result.scenario.tick_s))
@@ -422,7 +441,7 @@ class _Recorder:
             self.switch(path, (0.0, drawn), (False, True))
 
     def _known_floor(self, thing: Thing, shape: KnownFloor) -> None:
-        """Adds the floor that a robot knows to be free, and dots at echo positions."""
+        """Adds the floor that a robot knows to be free, and dots for echoes."""
         known = known_space(shape.own, known_times(shape.own))
         if known is None:
             return
@@ -446,7 +465,11 @@ class _Recorder:
                 self.switch(path, known.times, states)
 
     def _plume(self, thing: Thing, shape: Plume) -> None:
-        """Adds the odor source, and discs for the puffs nearest to their distances."""
+        """Adds the odor source, and discs that show some puffs of its plume.
+
+        For each disc, there is a fixed distance from the source. The disc shows the
+        puff whose distance from the source is nearest to this value.
+        """
         purple, height = "#993380", 0.12
         box, middle = Block(*CONTAINER_M, height), _placed(0.0, 0.0, 0.5 * height)
         self.put(f"{thing.path}/container", box, purple, middle)
@@ -483,7 +506,12 @@ class _Recorder:
 def _nearest(
     puffs: NDArray[np.float64], away: NDArray[np.float64], distance: float
 ) -> tuple[float, float, float]:
-    """Returns x, y and size of the puff nearest to a distance, m; NaN without one."""
+    """Returns x, y and size of the puff that a disc shows, m.
+
+    ``away`` are the distances of the puffs from the source, m. The result is the puff
+    whose distance is nearest to ``distance``. If it differs by ``_APART_M`` or more,
+    all three values are NaN.
+    """
     if len(away):
         k = int(np.abs(away - distance).argmin())
         if abs(away[k] - distance) < _APART_M:
@@ -491,7 +519,7 @@ def _nearest(
     return math.nan, math.nan, math.nan
 
 
-#: Geometry of the shapes that are single objects.
+#: Functions from a shape that is a single object in Meshcat to the geometry of it.
 _SINGLE: dict[type, Callable[[Any], Any]] = {
     Estimate: lambda _: Sphere(0.06),
     Ball: lambda shape: Sphere(shape.radius),

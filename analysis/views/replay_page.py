@@ -14,7 +14,7 @@ from analysis.views.framing import run_title, shown_rectangle
 from analysis.views.scene import Layer, Scene
 
 _HERE = Path(__file__).parent
-#: Call in Meshcat's page that passes a message to the viewer.
+#: Beginning of the call in Meshcat's page that passes a message to the viewer.
 _HANDLE = "viewer.handle_command_bytearray("
 _SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 
@@ -27,8 +27,9 @@ def replay_page(
 ) -> str:
     """Returns the page of Meshcat (Drake's 3D viewer) with added controls and charts.
 
-    ``meshcat_page`` is from ``Meshcat.StaticHtml``. The layers are the entries of the
-    legend. The charts are from ``page_charts``. The page needs no network.
+    ``meshcat_page`` is the result of ``Meshcat.StaticHtml``. Each of the ``layers`` is
+    an entry of the legend. ``charts`` are those of ``page_charts``. The page needs no
+    network.
     """
     result = scene.result
     data = {
@@ -37,7 +38,8 @@ def replay_page(
         "names": [(body.path, body.name) for body in scene.bodies.values()],
         "charts": charts,
     }
-    # The replacement prevents a text of the scenario from ending the script early.
+    # Without the replacement, a text of the scenario that contains "</script>" would
+    # end the script.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace(
         "<", "\\u003c"
     )
@@ -48,7 +50,8 @@ def replay_page(
     )
     style = f"{COLORS_CSS}\n{(_HERE / 'replay.css').read_text('utf-8')}"
     script = (_HERE / "replay.js").read_text("utf-8")
-    # The messages to the scene arrive one by one. The page waits for the last message.
+    # The page passes its messages to the viewer one by one. ``messagesLeft`` is 0 when
+    # the scene is complete.
     messages = meshcat_page.count(_HANDLE)
     waiting = (
         f"<script>let messagesLeft = {messages}; function handleMessage(bytes) "
@@ -137,7 +140,11 @@ def _entry(layer: Layer) -> str:
 
 
 def _hidden(layer: Layer) -> list[str]:
-    """Returns the paths that the switch of a layer hides, with all paths below them."""
+    """Returns the paths that the switch of a layer hides.
+
+    A path below another path of the layer is left out, because hiding a path also hides
+    everything below it.
+    """
     paths = [thing.path for thing in layer.things]
     return [
         path
@@ -155,7 +162,8 @@ def _quantities(charts: Sequence[Mapping[str, Any]]) -> str:
     options = []
     for robot, own in groupby(enumerate(charts), lambda pair: pair[1]["robot"]):
         inner = "".join(
-            # Each option contains the robot's name, because a closed list hides groups.
+            # Each option contains the name of its robot, because a closed list shows
+            # only the option and not its group.
             f'<option value="{k}">{html.escape(_whose(chart))}</option>'
             for k, chart in own
         )

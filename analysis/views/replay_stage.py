@@ -13,16 +13,16 @@ from pydrake.math import RigidTransform
 from analysis.views.framing import floor_rectangle, shown_rectangle
 from diagrams import RunResult
 
-#: Size of the numbers on the floor divided by the width of the view. The numbers are
-#: readable on a phone, too.
+#: Size of the numbers on the floor, divided by the width of the floor that the replay
+#: shows first. With this size, the numbers are readable on a phone, too.
 NUMBER_SHARE = 0.028
 
 
 def add_floor(meshcat: Meshcat, result: RunResult) -> None:
     """Adds a floor for the whole run, with one grid line per meter and labels of x.
 
-    The labels are at the near edge of the initial view. The floor extends beyond this
-    edge.
+    The labels are at the edge of ``shown_rectangle`` that is nearest to the viewer. The
+    floor extends beyond this edge.
     """
     x_low, x_high, y_low, y_high = floor_rectangle(result)
     x, y = (x_low + x_high) / 2.0, (y_low + y_high) / 2.0
@@ -45,7 +45,7 @@ def add_floor(meshcat: Meshcat, result: RunResult) -> None:
 
 
 def set_stage(meshcat: Meshcat) -> None:
-    """Sets even light and a plain background. The page chooses the view."""
+    """Sets even light and a plain background. Hides the grid and axes of Meshcat."""
     lamps = ("SpotLight", "PointLightNegativeX", "PointLightPositiveX")
     for path in ("/Grid", "/Axes", *(f"/Lights/{lamp}" for lamp in lamps)):
         meshcat.SetProperty(path, "visible", value=False)

@@ -30,7 +30,7 @@ from analysis.views.replay import write_replay
 from analysis.views.time_series import plot_time_series
 from diagrams import RunResult, build_sound_follower, write_scenario
 
-#: Other files in the directory of the page, and their contents.
+#: Files that the page lists, with descriptions of their contents.
 _FILES = {
     "replay.html": "the run in three dimensions, with curves over time",
     "trajectory.parquet": "one row per tick, SI units",
@@ -48,9 +48,10 @@ def write_run(
 ) -> None:
     """Writes all files of a run into an existing directory; docs/runs.md lists them.
 
-    With several robots, each robot has its own ``time_series_<name>.png`` and
-    ``diagram_<name>.svg``. The file ``diagram.svg`` then shows how the robots are
-    connected.
+    ``summary`` is the JSON document of the run. If ``pictures`` is false, the PNG and
+    SVG files are left out. With several robots, each robot has its own
+    ``time_series_<name>.png`` and ``diagram_<name>.svg``. The file ``diagram.svg`` then
+    shows how the robots are connected.
     """
     write_scenario(result.full_scenario, directory)
     write_json(summary, directory / "summary.json")
@@ -89,7 +90,10 @@ def _page(
     summary: Mapping[str, Any],
     directory: Path,
 ) -> str:
-    """Returns the page of a run; it shows only files that are in the directory."""
+    """Returns the HTML page of a run.
+
+    The page shows only files that are already in the directory.
+    """
 
     def there(name: str) -> bool:
         return (directory / name).is_file()
@@ -130,7 +134,10 @@ def _anchor(title: str) -> str:
 def _summary(
     result: RunResult, rows: Mapping[str, str], *, has_replay: bool
 ) -> list[Content]:
-    """Returns the warnings and the summary, with a list of rows per robot."""
+    """Returns the contents of the section "Summary".
+
+    They are the warnings, a list of the rows of each robot, and links to the replay.
+    """
     begin = 0
     parts: list[Content] = [
         Note(f"Warning: `{x.field}`: {x.message}") for x in result.warnings
@@ -162,7 +169,10 @@ def _summary(
 
 
 def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[Content]:
-    """Returns a table with one row per metric and one column per robot."""
+    """Returns the contents of the section "Figures".
+
+    A table has one row per metric and one column per robot.
+    """
     metrics: Mapping[str, Any] = summary["metrics"]
     prefixes = [f"{name}." for name in result.several] or [""]
     found = [

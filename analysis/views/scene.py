@@ -1,7 +1,8 @@
 """Makes the scene of a run: everything that pictures, films and replays show.
 
-A scene is a list of things with a shape, a color, and poses over time. Each way of
-showing a run draws the shapes that it knows, and leaves out all others.
+A scene is a list of things. Each thing has a shape, a color, and poses over time.
+Pictures, films and replays each draw the shapes that they know, and leave out all
+others. The sizes of shapes are in m.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Box(NamedTuple):
 
 
 class Touched(NamedTuple):
-    """The body that a robot has touched, from the collision on."""
+    """A body that a robot has touched. It is shown from the collision on."""
 
     length: float
     width: float
@@ -66,10 +67,12 @@ class SourceBody(NamedTuple):
 
 
 class Walls(NamedTuple):
-    """The walls of a room around a rectangle of the world frame W."""
+    """The walls of a room, whose floor is a rectangle along the axes of W."""
 
     corner: tuple[float, float]
+    """Least x and least y of the floor in W, m."""
     size: tuple[float, float, float]
+    """Size of the room along x, y and z, m."""
 
 
 class Cone(NamedTuple):
@@ -84,17 +87,18 @@ class Cone(NamedTuple):
 
 
 class Trail(NamedTuple):
-    """The past positions of a body or of a target: its poses up to now."""
+    """The path of a body or of a target from the start up to now."""
 
     line: str
-    """Style of the line in matplotlib. A dotted line is thin."""
+    """Style of the line in matplotlib: ``-``, ``--``, or ``:``."""
 
 
 class Estimate(NamedTuple):
-    """The position that a robot assumes for its target."""
+    """The position of its target that a robot assumes."""
 
     fresh: NDArray[np.bool_] | None = None
-    """(n,) whether the position is new at each tick. None for a target on a route."""
+    """(n,) whether the robot has a new estimate at each tick. None for a target on a
+    route, which the robot does not estimate."""
 
 
 class Goal(NamedTuple):
@@ -122,9 +126,11 @@ class KnownFloor(NamedTuple):
     """The floor that a robot knows to be free, and the places of its echoes."""
 
     own: RunResult
+    """Result of this robot."""
     echoes: str
     """Color of the places from which echoes came."""
     echoes_label: str
+    """Text for these places in the legend of a picture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +146,16 @@ class Thing:
     times: NDArray[np.float64]
     """(n,) ascending times, s."""
     poses: NDArray[np.float64]
-    """(n, 3) poses (x, y, theta) at the times, m and rad; (1, 3) at rest. They are in
-    the frame of the parent, or in the world frame W if there is no parent."""
+    """(n, 3) poses (x, y, theta) at the times, m and rad; (1, 3) for an object at rest.
+    They are in the frame of the parent, or in the world frame W if there is no
+    parent."""
     name: str = ""
     """Name that the replay writes above the object."""
     label: str = ""
     """Text in the legend of a picture."""
     seen: NDArray[np.bool_] | None = None
-    """(n,) whether the object is visible at the times. None: it always is."""
+    """(n,) whether the object is visible at the times. With None, it is always
+    visible."""
     parent: Thing | None = None
     """Object that carries this object."""
     height: float = 0.0
@@ -155,9 +163,10 @@ class Thing:
     alpha: float = 1.0
     """Opacity, 0 to 1."""
     scale: NDArray[np.float64] | None = None
-    """(n, 3) scale of the object along its own axes at the times."""
+    """(n, 3) factors of the object's size along its own axes at the times."""
     jumps: bool = False
-    """Whether the object rests between its jumps from pose to pose."""
+    """Whether the object jumps from pose to pose and rests in between. Otherwise, it
+    moves steadily from pose to pose."""
 
     @property
     def moves(self) -> bool:
@@ -165,21 +174,22 @@ class Thing:
         return bool(np.ptp(self.poses, axis=0).any())
 
     def pose(self, tick: int) -> NDArray[np.float64]:
-        """Returns the pose (x, y, theta) in W at one of the times."""
+        """Returns the pose (x, y, theta) in W at ``times[tick]``, m and rad."""
         own = self.poses[min(tick, len(self.poses) - 1)]
         return own if self.parent is None else compose(self.parent.pose(tick), own)
 
     def visible(self, tick: int) -> bool:
-        """Returns whether the object is visible at one of the times."""
+        """Returns whether the object is visible at ``times[tick]``."""
         return self.seen is None or bool(self.seen[tick])
 
 
 class Layer(NamedTuple):
-    """Things that share an entry of the legend."""
+    """Things that share one entry of the legend."""
 
     label: str
+    """Text of the entry."""
     meaning: str
-    """Short explanation; may be empty."""
+    """Short explanation beside the text; may be empty."""
     colors: tuple[str, ...]
     """Colors of the sample beside the label."""
     things: list[Thing]
@@ -189,7 +199,7 @@ class Layer(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """All things of a run, with the layers of their legend."""
+    """All things of a run, in layers. Each layer is an entry of the legend."""
 
     result: RunResult
     bodies: dict[str, Thing]
@@ -229,8 +239,8 @@ def scene_bodies(
 ) -> dict[str, Thing]:
     """Makes the robots, sources and obstacles of a scene, by name.
 
-    The (n,) times are ascending, s. At the times, each robot has (n, 3) poses in W, m
-    and rad.
+    ``times`` are (n,) ascending times, s. ``robots`` has the (n, 3) poses (x, y, theta)
+    of each robot at these times in W, m and rad, by name.
     """
     found = {}
     several, tints = len(robots) > 1, _robot_colors(scenario)
@@ -267,14 +277,14 @@ def _source_label(scenario: Scenario, name: str, followed: set[str]) -> str:
 
 
 def _robot_colors(scenario: Scenario) -> dict[str, str]:
-    """Returns the color of each robot; each of several robots has its own color."""
+    """Returns the color of each robot, by name. Several robots get different colors."""
     if len(scenario.robots) == 1:
         return dict.fromkeys(scenario.robots, COLORS["robot"])
     return dict(zip(scenario.robots, cycle(ROBOT_COLORS), strict=False))
 
 
 def _estimate_colors(scenario: Scenario) -> dict[str, str]:
-    """Returns the color of the position that each robot assumes for its target."""
+    """Returns the color of the target position that each robot assumes, by name."""
     if len(scenario.robots) == 1:
         return dict.fromkeys(scenario.robots, COLORS["estimate"])
     return _robot_colors(scenario)
@@ -381,7 +391,7 @@ def _cones(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
 
 
 def _logged_sensors(result: RunResult) -> range:
-    """Returns the numbers, from 0, of the range sensors with readings in the log."""
+    """Returns the indices of the range sensors whose readings are in the log."""
     robot = result.scenario.only
     if isinstance(robot, HasRangeSensors) and "range_1" in result.columns:
         return range(robot.ultrasonic.count)
@@ -389,9 +399,10 @@ def _logged_sensors(result: RunResult) -> range:
 
 
 def sensor_pose(robot: Robot, sensor: int) -> NDArray[np.float64]:
-    """Returns x, y, theta of a range sensor in the robot frame B, m and rad.
+    """Returns the pose (x, y, theta) of a range sensor in the robot frame B, m and rad.
 
-    The first sensor has the number 0.
+    ``sensor`` is the index of the sensor, from 0. theta is the direction of the axis of
+    its cone.
     """
     assert isinstance(robot, HasRangeSensors)
     own = robot.ultrasonic.sensors[sensor]
@@ -403,9 +414,10 @@ def sensor_pose(robot: Robot, sensor: int) -> NDArray[np.float64]:
 def compose(
     pose_WB: NDArray[np.float64], pose_BU: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Converts a pose (x, y, theta) in the frame B to the world frame W, m and rad.
+    """Converts the pose of an object U from the robot frame B to the world frame W.
 
-    The angle of the result is not wrapped.
+    Poses are (x, y, theta), m and rad. ``pose_WB`` is the pose of B in W, and
+    ``pose_BU`` is the pose of U in B. The angle of the result is not wrapped.
     """
     dx, dy = rotate(pose_WB[2], pose_BU[0], pose_BU[1])
     return np.array([pose_WB[0] + dx, pose_WB[1] + dy, pose_WB[2] + pose_BU[2]])
@@ -422,7 +434,7 @@ def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer
             places, seen, shape, label = own.vector("target"), None, Estimate(), ""
         elif "p_WS_estimated_x" in columns and robot.searches is None:
             valid = columns["target_valid"] > 0.5
-            # The target uses an estimate from the next tick on.
+            # An estimate changes the target only from the next tick on.
             heard = columns.get("detected", np.zeros_like(valid))[:-1] > 0.5
             shape = Estimate(np.r_[False, heard & valid[1:]])
             places, seen = own.vector("p_WS_estimated"), valid
@@ -520,9 +532,9 @@ def _odor(scenario: Scenario) -> Iterator[Layer]:
     odor, color = scenario.odor, COLORS["odor"]
     if odor is not None:
         place, start = np.array([[*odor.position_m, 0.0]]), np.zeros(1)
-        shape, label = Plume(scenario), "source of odour"
+        shape, label = Plume(scenario), "source of odor"
         plume = Thing("odor", shape, color, start, place, label=label)
-        yield Layer("odour", "the plume", (color,), [plume])
+        yield Layer("odor", "the plume", (color,), [plume])
 
 
 def lightened(color: str, part: float) -> str:

@@ -26,9 +26,10 @@ LONGEST_LINE = 13
 def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> Figure:
     """Draws measured, estimated and commanded quantities of one robot over time.
 
-    Bursts of the source are shaded. The clearance is that of ``panels``. If the robot
-    has a safety guard, two panels show the actions of the guard and the distance beyond
-    the one that the guard keeps.
+    Bursts of the source are shaded. ``clearance`` is that of ``panels``. If the robot
+    has a safety guard, one more panel shows the actions of the guard. Another panel
+    shows the distance in which the robot can stop. It also shows the distance to spare:
+    the distance to space that is not free, minus the distance that the guard needs.
     """
     shown, bursts = panels(result, clearance), heard_bursts(result)
     size = WIDTH_IN, 1.0 + PANEL_IN * len(shown)

@@ -1,4 +1,4 @@
-"""``phonotaxis accuracy``: localization errors of the papers and of this package."""
+"""``phonotaxis accuracy``: localization errors, beside those in the papers."""
 
 from __future__ import annotations
 

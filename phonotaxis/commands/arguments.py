@@ -25,9 +25,9 @@ def completed_by(argument: Any, words: dict[str, str] | str) -> None:
 
     Args:
         argument: Argument of a parser, as returned by ``add_argument``.
-        words: Either ``file`` or ``directory``, or a mapping. The mapping contains for
-            each shell the name of a shell function that prints the possible words. The
-            package shtab defines this format.
+        words: ``file``, ``directory``, or a mapping in the format of the package shtab.
+            The mapping contains, for each shell, the name of a shell function that
+            prints the possible words.
     """
     argument.complete = words
 
@@ -112,7 +112,11 @@ def take_scenario(parser: ArgumentParser) -> None:
 
 
 def overrides(options: Namespace) -> list[str]:
-    """Lists the settings of all options; options for one field override ``--set``."""
+    """Lists the settings that the options make, as texts ``key=value``.
+
+    Options for a single field, for example ``--seed``, come last and override
+    ``--set``.
+    """
     found = list(options.set)
     for option, field in (
         ("seed", "seed"),
@@ -127,7 +131,9 @@ def overrides(options: Namespace) -> list[str]:
 
 
 def say(text: str) -> None:
-    """Names the work that begins, on a terminal, before imports that take seconds.
+    """Prints which work begins, if standard error is a terminal.
+
+    Commands call this function before imports that take seconds.
 
     Args:
         text: Name of the work, for example 'simulating default'.

@@ -1,4 +1,4 @@
-"""``phonotaxis calibrate``: microphone positions from sounds at known positions."""
+"""``phonotaxis calibrate``: finds microphone positions by sounds at known positions."""
 
 from __future__ import annotations
 

@@ -25,9 +25,9 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
 
     Raises:
         InputError: The input is not valid.
-        RunError: The run failed. Or an interrupt stopped the run, and some results
+        RunError: The work failed. Or an interrupt stopped the work, and some results
             remain on the disk.
-        KeyboardInterrupt: An interrupt stopped the run, and no results remain.
+        KeyboardInterrupt: An interrupt stopped the work, and no results remain.
     """
     from analysis.report.result_directory import whole_directory
     from analysis.run_error import RunError, no_exit
@@ -53,7 +53,7 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
                     document, out = _written(command, options, result, place)
             interrupts.check()  # from here on, the files stay
     except BaseException:
-        # An interrupt may have become another exception on its way.
+        # A library may have turned the interrupt into another exception.
         if not interrupts.struck:
             raise
         left = prepared.left() if prepared is not None else ""

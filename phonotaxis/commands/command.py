@@ -1,4 +1,4 @@
-"""Descriptions of a subcommand, for ``carry_out``."""
+"""The class that describes a subcommand, and the classes that it uses."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class Place:
     """Hidden directory that holds the files until the command ends."""
 
 
-#: Reserves the result directory: the one of ``--out``, or else the next number under
-#: results/.
+#: Function that reserves the result directory. The argument is the value of ``--out``.
+#: None means the next number under results/.
 Take = Callable[[str | None], Place]
 
 
 @dataclass(frozen=True)
 class Printed(Output):
-    """An output without files and pictures."""
+    """An output without files and pictures, which is only printed."""
 
     content: dict[str, Any]
     text: str
@@ -62,16 +62,16 @@ class Command:
     """One line about the command, for the help."""
     add_arguments: Callable[[ArgumentParser], None]
     prepare: Callable[[Namespace, Take], Prepared[Output]]
-    """Checks the input, and returns the work. It is light: it loads Drake only after
-    the input has been accepted."""
+    """Checks the input, and returns the work. To reject wrong input quickly, this
+    function loads Drake only after it has accepted the input."""
     examples: tuple[str, ...] = ()
     """Example command lines for the help, without the name of the program."""
     where: str = "\nresults in {out}"
-    """Last line of the text, if there is a result directory."""
+    """Last line of the printed text, if there is a result directory ``out``."""
     write: Callable[[Namespace, Any, dict[str, Any], Path], None] = _write
     """Writes the files of a result into a directory."""
     live: bool = False
-    """Whether the command prints on standard output while it runs, and an interrupt is
-    its usual end. Such a command must not run a user's code."""
+    """Whether the command prints on standard output while it runs, and usually ends by
+    an interrupt. Such a command must not run a user's code."""
     synonyms: tuple[str, ...] = ()
     """Other words that users type for the command, which work, too."""

@@ -75,7 +75,7 @@ class _Parser(argparse.ArgumentParser):
     """Parser that raises an exception for wrong words and suggests similar words."""
 
     def print_help(self, file: Any = None) -> None:
-        # The method of argparse hides errors of standard output.
+        # The method of argparse ignores errors when it writes to standard output.
         (file or sys.stdout).write(self.format_help())
 
     #: Parsers of the subcommands, by name.
@@ -144,7 +144,7 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
         if unknown:
             parser.refuse(options.command, unknown, words)
         carry_out(COMMANDS[options.command], options, interrupts)
-    except BrokenPipeError:  # the reader of our output has left
+    except BrokenPipeError:  # the program that reads our output has ended
         return FAILED
     except Exception as error:  # noqa: BLE001  # bad input, a failed run, or a bug
         return _report(error, words)
@@ -154,7 +154,7 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
 
 
 def _drop_unwritable() -> None:
-    """Drops output that cannot be written, to avoid an error at Python's exit."""
+    """Discards output that cannot be written. Python's exit would write it again."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -1,4 +1,4 @@
-"""``phonotaxis compare``: laws side by side on the same random layouts."""
+"""``phonotaxis compare``: compares control laws on the same random layouts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``phonotaxis completion``: a script for completion with the tab key in a shell."""
+"""``phonotaxis completion``: prints a script with which a shell completes words."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from phonotaxis.commands.arguments import (
 from phonotaxis.commands.command import Command, Printed, Take
 from phonotaxis.result import Prepared
 
-#: Text of a shell function, by shell. The function offers some words and all files.
+#: Text of a shell function, by shell. The function completes words and file names.
 _FUNCTIONS = {
     "bash": '{name}() {{ compgen -W "{words}" -- "$1"; compgen -f -- "$1"; }}',
     "zsh": "{name}() {{ _alternative 'words:name:({words})' 'files:file:_files' }}",
@@ -56,7 +56,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[Printed]:
 
 
 def _complete_paths(parser: ArgumentParser) -> None:
-    """Completes file and directory arguments, which are recognized by their names."""
+    """Sets the completion of file and directory arguments, by the word in the help."""
     for command in parser.below.values():  # type: ignore[attr-defined]
         for argument in command._actions:
             name = str(argument.metavar)

@@ -1,4 +1,4 @@
-"""``phonotaxis design``: gains of the laws from stated requirements."""
+"""``phonotaxis design``: derives gains of the laws from stated requirements."""
 
 from __future__ import annotations
 

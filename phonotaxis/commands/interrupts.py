@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: when they may stop the work."""
+"""Decides when Ctrl-C and SIGTERM stop the work of a command."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interrupts:
-    """Notes that the process received Ctrl-C or SIGTERM.
+    """Handler of interrupts, which are Ctrl-C and SIGTERM.
 
-    The first interrupt waits for the next ``check``, because libraries misbehave if an
-    exception is raised while they load, or in their callbacks. A second interrupt
-    raises ``KeyboardInterrupt`` at once.
+    The first interrupt has no effect until the next call of ``check``, because
+    libraries misbehave if an exception is raised while they load, or in their
+    callbacks. A second interrupt raises ``KeyboardInterrupt`` at once.
 
     Args:
-        last: Whether the process ends with the command. If so, signals are ignored from
-            the end of the command on. They then cannot disturb the shutdown of Python.
+        last: Whether the process ends with the command. If so, interrupts are ignored
+            after the command, so that they do not disturb the shutdown of Python.
     """
 
     def __init__(self, *, last: bool = False) -> None:
         self._last = last
         self._waits = True
         self.struck = False
-        """Whether there was an interrupt."""
+        """Whether there was an interrupt since the last call of ``forget``."""
 
     def __enter__(self) -> Interrupts:
         self._before = {each: signal.signal(each, self._strike) for each in _SIGNALS}
@@ -51,7 +51,7 @@ class Interrupts:
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
-        """Lets the first interrupt stop the work at any point of the ``with`` block.
+        """Lets even the first interrupt stop the work anywhere in the ``with`` block.
 
         Raises:
             KeyboardInterrupt: There was an interrupt before or within the block.

@@ -1,4 +1,4 @@
-"""``phonotaxis listen``: tracks the sound sources in a live or recorded sound."""
+"""``phonotaxis listen``: tracks sound sources in live or recorded sound."""
 
 from __future__ import annotations
 

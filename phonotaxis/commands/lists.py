@@ -212,7 +212,7 @@ def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
 
 
 def _paragraph(field: Field) -> str:
-    """Describes a field: a line with the values for ``--set``, then the meaning."""
+    """Describes a field: a line with path, default, type, and range; the meaning."""
     unit = f" {field.unit}" if field.unit else ""
     has_no_default = field.default is None and field.kind == "group"
     default = "" if has_no_default else f" = {json.dumps(field.default)}{unit}"

@@ -1,4 +1,4 @@
-"""``phonotaxis locate``: bearing and range of the source in a recording, over time."""
+"""``phonotaxis locate``: finds bearings and ranges of sources in a recording."""
 
 from __future__ import annotations
 

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 
 class Progress:
-    """Shows a progress bar on a terminal, and nothing if standard error is a pipe.
+    """Shows a progress bar if standard error is a terminal, and handles interrupts.
 
-    Interrupts wait between the calls of this object. Each call lets a waiting interrupt
-    stop the command.
+    The work calls this object from time to time. If there was an interrupt since the
+    last call, the call raises ``KeyboardInterrupt``.
 
     Args:
         interrupts: Handler of Ctrl-C and SIGTERM.
@@ -48,8 +48,9 @@ class Progress:
         """Shows how much work is done.
 
         Args:
-            done: Amount of finished work, in the unit of the bar. Or the name of the
-                next step, which counts the previous step as done.
+            done: Either the amount of finished work, in the unit of the bar, or the
+                name of the step that begins now. With names, the bar shows the number
+                of finished steps.
 
         Raises:
             KeyboardInterrupt: An interrupt came since the last call.

@@ -80,7 +80,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[RunResult]:
     def run(progress: Callable[[float], None]) -> RunResult:
         try:
             return prepared.run(progress)
-        except InputError as error:  # found after the input had been accepted
+        except InputError as error:  # not found when the input was checked
             raise RunError(str(error)) from error
 
     return replace(prepared, run=run)

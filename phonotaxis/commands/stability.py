@@ -1,4 +1,4 @@
-"""``phonotaxis stability``: the stability of a scenario's control loop."""
+"""``phonotaxis stability``: analyzes the stability of a scenario's control loop."""
 
 from __future__ import annotations
 

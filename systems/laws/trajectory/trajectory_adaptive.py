@@ -26,9 +26,10 @@ class AdaptationParameters(Parameters):
     grows toward the object, because sensitivities need a force without jumps.
     """
     rate: NonNegative = 10.0
-    """Rate gamma = eta/T of K and D, (N/m)^2/(m^2 s)."""
+    """Rate gamma = eta/T of K and D. The unit is (N/m)^2/(m^2 s) for the rule
+    ``sensitivity`` and (N/m)^2 s^2/m^2 for the rule ``lyapunov``."""
     contact_rate: NonNegative = 0.0
-    """Rate gamma of K_e, (N/m)^2/(m^2 s). With 0, K_e is fixed."""
+    """Rate gamma of K_e, in the unit of ``rate``. With 0, K_e is fixed."""
     penalty: NonNegative = 0.0
     """Weight lambda of the safety term, without unit. With 0 the term is off.
 

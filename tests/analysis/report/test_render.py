@@ -129,9 +129,7 @@ def test_sections_have_anchors_and_headings_of_their_level():
     shown = html(SECTION, "top")
     assert '<h2 id="top">Top</h2>' in shown
     assert '<h3 id="top-inner">Inner</h3>' in shown
-    assert '<section class="fresh"><h3 id="a">A</h3>' in html(
-        Section("a", "A", fresh=True), "a", level=3
-    )
+    assert '<section><h3 id="a">A</h3>' in html(Section("a", "A"), "a", level=3)
 
 
 def test_pictures_are_links_to_their_files():

@@ -112,7 +112,7 @@ def test_pictures_have_what_was_sensed(mission, robot):
 def test_the_map_shows_the_plume(mission):
     legend = plot_trajectory(mission).legends[0]
     texts = [text.get_text() for text in legend.get_texts()]
-    assert "source of odour" in texts
+    assert "source of odor" in texts
     assert any(text.startswith("odor at the end") for text in texts)
 
 

@@ -38,7 +38,7 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("data", "meant", "instead"),
     [
-        # What places an obstacle is one point of its way, not the place of an odour.
+        # What places an obstacle is one point of its way, not the place of an odor.
         (
             {"obstacles": [{"position_m": [3, 1]}]},
             "waypoints_m",
@@ -59,7 +59,7 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:
             "size_m",
             {"obstacles": [{"size_m": [1, 1]}]},
         ),
-        # The robot's own start, not another robot's or the odour's.
+        # The robot's own start, not another robot's or the odor's.
         (
             {"robots": {"one": {"position_m": [0, 1]}}},
             "robots.one.start.position_m",
