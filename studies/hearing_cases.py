@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
+
 from studies.support.hearing_cases.case import HearingCase
 from studies.tables import Table
 
@@ -35,16 +37,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Iterator[Table]:
     """Yields the counts of all kinds, and then each case that was wrong."""
-    rows, wrong = [], []
+    rows: list[list[object]] = []
+    wrong: list[list[object]] = []
+    sums = np.zeros(3, dtype=int)
     for name, (title, cases) in kinds().items():
         if options.kind and options.kind not in name:
             continue
         chosen = [c for c in cases if not options.case or options.case in c.name]
         outcomes = [(case, case.judge()) for case in chosen]
-        right = sum(outcome.right for _, outcome in outcomes)
-        claims = sum(outcome.false_claim for _, outcome in outcomes)
-        rows.append([title, len(outcomes), right, claims])
+        counts = [
+            sum(getattr(outcome, name) for _, outcome in outcomes)
+            for name in ("right", "false_claim")
+        ]
+        sums += np.array([len(outcomes), *counts])
+        rows.append([title, len(outcomes), *counts])
         wrong += [[title, c.name, o.said] for c, o in outcomes if not o.right]
-    total = ["all", *(sum(row[k] for row in rows) for k in (1, 2, 3))]
+    total = ["all", *sums.tolist()]
     yield Table("Cases", ("kind", "cases", "right", "false claims"), [*rows, total])
     yield Table("Wrong answers", ("kind", "case", "said"), wrong)
