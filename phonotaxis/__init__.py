@@ -132,8 +132,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Args:
         arguments: Words after the name of the program. None means the words with which
-            this process was started. The process must then end after the command,
-            because it ignores interrupts from then on.
+            this process was started. In that case, the caller must end the process
+            when the function returns, because the process ignores interrupts after the
+            command.
 
     Returns:
         Exit status: 0 if the command succeeded, 2 if the input is not valid, 1 after

@@ -120,7 +120,8 @@ def estimate_rows(summary: Summary) -> list[list[str]]:
 
 
 def robot_rows(summary: Summary) -> list[list[str]]:
-    """Returns the rows of a table: a heading, then one row per cell and robot.
+    """Returns the rows of a table: a heading, then one row for each robot in each
+    cell of the sweep. A cell is one combination of the varied values.
 
     There are no rows if the scenario has only one robot.
     """

@@ -77,7 +77,8 @@ class ListenerMemory:
     def after_gap(self, plan: VotePlan, *, keeps_tracks: bool) -> ListenerMemory:
         """Returns the state after missing samples or a change of the channels.
 
-        Times continue, and no identity of a track is used again.
+        Times continue. With ``keeps_tracks``, the present tracks keep their identities;
+        otherwise they end. A new track never gets the identity of an earlier track.
         """
         # The first group of frames after the gap begins at most one hop from its exact
         # time.
