@@ -78,8 +78,8 @@ def climb(
 
     It is the minimum, over all paths from the cell to contact with one body, of the
     largest energy on the path. The algorithm is Dijkstra's, with this largest energy
-    instead of a sum as the cost of a path. Cells are settled in ascending order of their escape energies. Paths may go to
-    all eight neighbors of a cell.
+    instead of a sum as the cost of a path. Cells are settled in ascending order of
+    their escape energies. Paths may go to all eight neighbors of a cell.
 
     Args:
         lower: (nx, ny) least potential in each cell, J.
