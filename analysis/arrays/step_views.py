@@ -105,8 +105,8 @@ def view(step: HeardStep, width: int, faults: list[str]) -> list[str]:
     """Formats a step as lines of text for a screen with ``width`` columns.
 
     The lines are a compass, one line per source, and one line per fault. The middle of
-    the compass is ahead (+x). Its left half goes to the left and its right half to the
-    right. Both ends are behind.
+    the compass is straight ahead (+x). Bearings to the left are in its left half, those
+    to the right in its right half. Both ends are straight behind.
     """
     columns = min(_COLUMNS, max(_LEAST_COLUMNS, width - 3) // 2 * 2 + 1)
     marks, names = ["·"] * columns, [" "] * columns

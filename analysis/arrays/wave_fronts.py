@@ -1,4 +1,4 @@
-"""Delays of a sound at microphones, and the slopes of these delays.
+"""Delays of a sound at microphones, and their derivatives by the source.
 
 A pair (h, w) describes a source at the position h / w. If w is 1, h is the position. If
 h is a unit vector, w is the inverse range, which may be 0.

@@ -120,10 +120,10 @@ def estimate_rows(summary: Summary) -> list[list[str]]:
 
 
 def robot_rows(summary: Summary) -> list[list[str]]:
-    """Returns the rows of a table: a heading, then one row for each robot in each
-    cell of the sweep. A cell is one combination of the varied values.
+    """Returns the rows of a table of all robots, with a heading.
 
-    There are no rows if the scenario has only one robot.
+    Each robot has one row in each cell of the sweep. A cell is one combination of the
+    varied values. There are no rows if the scenario has only one robot.
     """
     names = {robot: quantities(summary.rows, robot=robot) for robot in summary.robots}
     if not any(names.values()):

@@ -74,11 +74,12 @@ def border_cells(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def climb(
     lower: NDArray[np.float64], seeds: NDArray[np.float64], blocked: NDArray[np.bool_]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the escape energy of each cell for contact with one body.
+    """Computes the escape energy of each cell: the least energy that reaches a contact.
 
-    The algorithm is Dijkstra's. The cost of a path is its largest energy instead of a
-    sum. Cells are settled in ascending order of their escape energies. Paths may go to
-    all eight neighbors of a cell.
+    It is the minimum, over all paths from the cell to contact with one body, of the
+    largest energy on the path. The algorithm is Dijkstra's, with this largest energy
+    instead of a sum as the cost of a path. Cells are settled in ascending order of
+    their escape energies. Paths may go to all eight neighbors of a cell.
 
     Args:
         lower: (nx, ny) least potential in each cell, J.

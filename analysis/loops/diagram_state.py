@@ -67,10 +67,10 @@ class Runner:
 def run_periods(
     simulator: Any, state: Any, time_s: float, periods: int, tick_s: float
 ) -> None:
-    """Simulates some control periods from a state (n,).
+    """Simulates ``periods`` control periods from the state (n,) at a time.
 
-    Start and end are just before a control update. ``time_s`` is rounded to a multiple
-    of the control period ``tick_s``.
+    The time ``time_s`` is rounded to a multiple of the control period ``tick_s``. The
+    simulation starts and ends just before a control update.
     """
     begin(simulator, state, time_s, tick_s)
     # Drake's tick times are multiples of the period. A sum of periods would give a

@@ -125,10 +125,11 @@ class MeasuredRun(Proximity):
 
     @cached_property
     def settling_time(self) -> float | None:
-        """Time after which P stays in the goal until the run ends, s.
+        """Time from which P stays in the goal until the run ends, s.
 
-        If the source is at rest, P must also stay at rest, for at least
-        ``stop.rest_time_s``. The value is None if there is no such time.
+        If the source is at rest, P must also be at rest from this time to the end of
+        the run, and this rest must last at least ``stop.rest_time_s``. The value is
+        None if there is no such time.
         """
         settled, least = self.in_goal, 0.0
         if not self.result.target_moves:
