@@ -64,7 +64,7 @@ def fail(*_args, **_options):
         (["stability"], "phonotaxis.loops.analyze_law"),
         (["accuracy"], "analysis.arrays.localization.prepare_localization"),
         (["locate", "heard.wav"], "phonotaxis.recordings.located"),
-        (["scenarios"], "diagrams.library_scenarios"),
+        (["scenarios"], "diagrams.scenario.loading.library_scenarios"),
         (["compare", "wall"], "phonotaxis.batches.prepare_comparison"),
     ],
 )
@@ -277,7 +277,7 @@ def shell(
         ("scenarios >/dev/full", 1, "standard output cannot be written (No space"),
         ("columns --json >/dev/full", 1, "standard output cannot be written (No sp"),
         (f"{QUICK} >/dev/full", 1, "on device); the results are in out"),
-        ("simulat --json >/dev/full", 2, "invalid choice: 'simulat'"),
+        ("simulat --json >/dev/full", 2, "'simulat' is not a command"),
         ("simulat >/dev/full 2>/dev/full", 2, ""),
         ("( sleep 0.5; {} scenarios; echo $? >status ) | true", 1, ""),
         ("( sleep 0.5; {} --help; echo $? >status ) | true", 1, ""),

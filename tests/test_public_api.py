@@ -296,7 +296,6 @@ def test_a_comparison_counts_the_runs_with_warnings(tmp_path: Path):
     ("options", "message"),
     [
         ({"laws": "magic"}, r"'magic' is not known"),
-        ({"laws": "active,active"}, r'"active" is listed twice'),
         ({"grid": {"hearing": "ideal"}}, "grid.hearing: is 'ideal'; give a list"),
     ],
 )
@@ -344,6 +343,16 @@ def test_stability_gives_findings_and_a_page(
     assert len(told) == 2
     assert len(found.analyses[0].sections) == 2
     assert (found.save(tmp_path / "report") / "report.html").is_file()
+    # A model as a system of python-control has the poles of the document.
+    system = found.state_space("continuous")
+    told = found.document()["linear_models"]["continuous"]["A"]
+    np.testing.assert_array_equal(system.A, told)
+    assert system.isctime(strict=True)
+    assert found.state_space().name == system.name
+    with pytest.raises(phonotaxis.InputError, match="model: 'loops' is not a model"):
+        found.state_space("loops")
+    with pytest.raises(phonotaxis.InputError, match="law: 'dwa' is not analyzed"):
+        found.state_space(law="dwa")
 
 
 def test_stability_warns_that_other_robots_are_left_out(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from diagrams.building.robot import Parts
 from diagrams.running.referee import Referee
-from diagrams.running.stop_rules import Collision
+from diagrams.running.stop_rules import SUCCESSFUL, Collision
 from diagrams.scenario.bodies import RecordedPath, Surroundings
 from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.scenario import Scenario
@@ -95,6 +95,11 @@ class RunResult:
         if self.collision:
             return f"{self.cause} with {self.collision.object}"
         return f"{self.cause}: {self.reason}" if self.reason else self.cause
+
+    @property
+    def success(self) -> bool:
+        """Whether the run ended well: at the goal, at what was sought, or on time."""
+        return self.cause in SUCCESSFUL
 
     @property
     def reason(self) -> str:

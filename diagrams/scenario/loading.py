@@ -154,7 +154,7 @@ def _find(source: str | Path) -> Path:
         return library[str(source)]
     path = Path(source)
     known = "a name that 'phonotaxis scenarios' lists"
-    if path.is_dir():
+    if str(source) and path.is_dir():
         if (path / SCENARIO_FILE).is_file():
             return path / SCENARIO_FILE
         raise InputError(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from itertools import combinations
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,7 @@ from diagrams.scenario.participants import (
 from diagrams.scenario.run_parameters import RunParameters
 from diagrams.scenario.settings import all_settings, apply_settings
 from diagrams.scenario.shorthand import (
+    ROBOT_FIELDS,
     SOURCE,
     as_written,
     field_in,
@@ -93,12 +94,26 @@ class Scenario(RunParameters):
     named ``source``. A source that no robot follows is an interferer."""
 
     def __init__(self, **fields: Any) -> None:
-        super().__init__(**fields)
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise _explained(error, fields) from None
 
     @model_validator(mode="before")
     @classmethod
     def _resolve(cls, data: Any) -> Any:
         return resolved(data) if isinstance(data, Mapping) else data
+
+    if not TYPE_CHECKING:  # a type checker would accept every name
+
+        def __getattr__(self, name: str) -> Any:
+            """Reads a field of the only robot or source, as files write it."""
+            if name in ROBOT_FIELDS and len(self.robots) == 1:
+                return getattr(self.only, name)
+            if name in ("source", "sound") and len(self.sources) == 1:
+                (source,) = self.sources.values()
+                return source if name == "source" else source.sound
+            return super().__getattr__(name)
 
     @property
     def only(self) -> Robot:
@@ -577,8 +592,12 @@ def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        written = partial(as_written, data=data)
-        raise explain(error, scenario_schema(), "a scenario", written) from None
+        raise _explained(error, data) from None
+
+
+def _explained(error: ValidationError, data: Mapping[str, Any]) -> InputError:
+    written = partial(as_written, data=data)
+    return explain(error, scenario_schema(), "a scenario", written)
 
 
 def frame_of(robot: Robot) -> float:

@@ -125,10 +125,12 @@ def _of_field(name: str, value: str) -> str:
 
     schema, word = scenario_schema(), name.replace("-", "_")
     groups = {each.path for each in list_fields(schema) if "group" in each.kind}
-    paths = [path for path in fields_called(schema, word) if path not in groups]
     listed = f"'phonotaxis fields {word}'"
+    if word in groups:
+        return f"; {listed} lists its fields, for --set"
+    paths = [path for path in fields_called(schema, word) if path not in groups]
     if not paths:
-        return f"; {listed} lists its fields, for --set" if word in groups else ""
+        return ""
     text = f"; write --set {paths[0]}={value or 'VALUE'}"
     return text if len(paths) == 1 else f"{text}, or see {listed}"
 

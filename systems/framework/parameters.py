@@ -65,6 +65,17 @@ class Parameters(BaseModel):
         allow_inf_nan=False,
     )
 
+    def __eq__(self, other: object) -> bool:
+        """Compares the fields, and not the cached properties, which may be arrays."""
+        if type(self) is not type(other):
+            return NotImplemented
+        mine, theirs = self.__dict__, other.__dict__
+        return all(mine[name] == theirs[name] for name in type(self).model_fields)
+
+    def __hash__(self) -> int:
+        values = (self.__dict__[name] for name in type(self).model_fields)
+        return hash((type(self), *values))
+
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuses every assignment, because results belong to unchanged parameters."""
         if name.startswith("_"):

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from diagrams.scenario.participants import KINDS
 from diagrams.scenario.scenario import Scenario
 from systems.base.robot import RobotParameters
+from systems.framework.input_error import InputError
 from systems.framework.meanings import meanings
 from systems.framework.parameters import (
     Fraction,
@@ -94,7 +95,7 @@ def test_lists_of_yaml_become_tuples():
 
 
 def test_frozen():
-    with pytest.raises(ValidationError, match="frozen"):
+    with pytest.raises(InputError, match="radius: cannot be assigned"):
         Example().radius = 2.0
 
 
