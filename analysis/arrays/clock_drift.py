@@ -1,8 +1,10 @@
 """Finds channels from recorders whose clocks drift apart.
 
-Sound can arrive at two microphones with a delay of at most the travel time between
-them. If a delay grows steadily beyond this limit, the two channels have different
-clocks.
+The delays of a moving source change as well, but at each time, they are those of a
+wave front. Drifting clocks change delays so that they fit a wave front less and less,
+or become longer than sound takes from one microphone to another. If a drift changes the
+delays like a source that turns around the array, the two cannot be distinguished, until
+the delays are too long for the array.
 
 The recording is cut into short stretches. The delays of each stretch are the peaks of
 cross-correlations with the phase transform (Knapp and Carter 1976). The search covers
@@ -14,11 +16,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.stats import theilslopes
 
 from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.wave_fronts import wave_front_misfits
 from systems.delays.correlations import correlations_at_lags
 
 #: Length of a stretch, s. If clocks differ by 100 ppm, they drift by 50 us in this
@@ -38,14 +42,30 @@ _STANDS_OUT = 6.0
 # _LEAST: least number of stretches.
 # _LEAST_S: least time from the first to the last stretch, s.
 # _MOST: largest number of stretches.
-_LEAST, _LEAST_S, _MOST = 8, 4.0, 240
+_LEAST, _LEAST_S, _MOST = 12, 4.0, 240
 
-# Least ratio between a delay and the longest delay that the array allows.
-_BEYOND = 1.15
+# Number of stretches before and after a stretch with which its delays are compared.
+_BESIDE = 6
+
+# The misfits of a drift grow by more than the larger of two limits:
+# - _GROWTH_S: a time that is longer than the errors of delays in rooms, s.
+# - _GROWTH_SHARE: a share of the travel time of sound along the array.
+_GROWTH_S, _GROWTH_SHARE = 1.2e-4, 0.05
+
+# The misfits of a drift grow steadily:
+# - _HALFWAY: at half time, the growth is at least this share of the whole growth, and
+#   at most 1 minus this share.
+# - _SCATTER: largest median deviation within a third of the time, as a share of the
+#   growth. A linear growth has a share of 1/8.
+_HALFWAY, _SCATTER = 0.2, 0.35
 
 # Channels drift together if their delays grow by at least this share of the fastest
 # drift, in the same direction.
 _TOGETHER = 0.5
+
+# Delays that are off a straight line by more than this share of their change are those
+# of a moving source. They do not tell which channels drift.
+_MOVES = 0.12
 
 # Largest relative drift of a clock, s/s. A faster change has another cause.
 _MOST_DRIFT = 2e-3
@@ -82,7 +102,7 @@ def clock_drift(
     c: float,
     channels: Sequence[int] | None = None,
 ) -> ChannelFault | None:
-    """Finds channels whose delays grow steadily beyond what the array allows.
+    """Finds channels whose delays leave those of any source further and further.
 
     The delays ``lags`` are the results of ``common_lags`` for k stretches, with the
     shape (k, n - 1), and ``t_s`` are the middles of the stretches. ``p_AM`` contains
@@ -90,13 +110,30 @@ def clock_drift(
     ``channels`` lists their numbers from 0.
     """
     numbers = list(range(len(p_AM)) if channels is None else channels)
-    allowed = np.linalg.norm(p_AM[numbers[1:]] - p_AM[numbers[0]], axis=1) / c
-    found = [_slope(t_s, lag, most) for lag, most in zip(lags.T, allowed, strict=True)]
-    beyond = [slope for slope, is_beyond in found if is_beyond]
-    if not beyond:
+    places = p_AM[numbers]
+    lags = _without_echoes(lags, np.linalg.norm(places[1:] - places[0], axis=1) / c)
+    heard = np.isfinite(lags).any(axis=1)
+    t_s, lags = t_s[heard], lags[heard]
+    if len(t_s) < _LEAST or t_s[-1] - t_s[0] < _LEAST_S:
         return None
-    fastest = max(beyond, key=abs)
-    drifting = [False, *(slope / fastest > _TOGETHER for slope, _ in found)]
+    misfits = wave_front_misfits(lags, places, c)
+    # The delays may leave those of a source only in the second half of the time.
+    parts = (misfits, misfits[-max(_LEAST, len(t_s) // 2) :])
+    if not any(_leaves(part, places, c) for part in parts):
+        return None
+    lines = [_line(t_s, lag) for lag in lags.T]
+    slopes = np.array([0.0, *(slope for slope, _ in lines)])
+    fastest = slopes[np.abs(slopes).argmax()]
+    if not 0.0 < abs(fastest) < _MOST_DRIFT:
+        return None
+    if max(off for _, off in lines) > _MOVES * abs(fastest) * (t_s[-1] - t_s[0]):
+        return ChannelFault(
+            "drift",
+            (),
+            "channels: their clocks drift apart, because their delays fit a source "
+            "less and less; record all channels with one clock",
+        )
+    drifting = slopes / fastest > _TOGETHER
     late, others = (
         [k for k, drifts in zip(numbers, drifting, strict=True) if drifts == which]
         for which in (True, False)
@@ -108,6 +145,55 @@ def clock_drift(
         f"{_names(late)}: {clock} from that of {_names(others)} by "
         f"{1e6 * abs(fastest):.0f} us per second; record all channels with one clock",
     )
+
+
+def _without_echoes(
+    lags: NDArray[np.float64], allowed_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Returns (k, n - 1) delays without those that no source can have beside the rest.
+
+    Each delay is compared with the median of its neighbors in time. The delays of two
+    sources differ by at most twice the travel time between the two microphones.
+    """
+    padded = np.pad(lags, ((_BESIDE, _BESIDE), (0, 0)), constant_values=np.nan)
+    windows = sliding_window_view(padded, 2 * _BESIDE + 1, axis=0)
+    known = np.isfinite(windows).any(axis=2)
+    usual = np.nanmedian(np.where(known[:, :, np.newaxis], windows, 0.0), axis=2)
+    off = np.abs(lags - usual)
+    return np.where(off < 2.0 * allowed_s + _GROWTH_S, lags, np.nan)
+
+
+def _leaves(
+    misfits: NDArray[np.float64], places: NDArray[np.float64], c: float
+) -> bool:
+    """Returns whether (k, n) misfits of wave fronts grow steadily over k stretches.
+
+    The misfits of the first, middle and last third of the stretches are compared by
+    their medians, because echoes cause large errors in some stretches.
+    """
+    thirds = [_median(part) for part in np.array_split(misfits, 3)]
+    growth = thirds[2] - thirds[0]
+    known = np.isfinite(growth + thirds[1])
+    if not known.any():
+        return False
+    size = float(np.linalg.norm(growth[known]))
+    aperture_s = float(np.linalg.norm(places[:, np.newaxis] - places, axis=2).max()) / c
+    if size < max(_GROWTH_S, _GROWTH_SHARE * aperture_s):
+        return False
+    along = growth[known] / size
+    halfway = float((thirds[1] - thirds[0])[known] @ along) / size
+    scatter = max(
+        float(np.nanmedian(np.abs((part - middle)[:, known] @ along)))
+        for part, middle in zip(np.array_split(misfits, 3), thirds, strict=True)
+    )
+    return _HALFWAY < halfway < 1.0 - _HALFWAY and scatter < _SCATTER * size
+
+
+def _median(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the medians of columns; NaN for a column with fewer than 3 numbers."""
+    known = np.isfinite(values).sum(axis=0) >= 3
+    filled = np.where(known, values, 0.0)
+    return np.where(known, np.nanmedian(filled, axis=0), np.nan)
 
 
 def _names(channels: Sequence[int]) -> str:
@@ -133,20 +219,13 @@ def recording_drift(
     return clock_drift((starts + 0.5 * size) / sample_rate_hz, lags, p_AM, c)
 
 
-def _slope(
-    t_s: NDArray[np.float64], lag: NDArray[np.float64], allowed: float
-) -> tuple[float, bool]:
-    """Returns the slope of a line through delays, and whether it shows a drift."""
+def _line(
+    t_s: NDArray[np.float64], lag: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Returns the slope of a line through delays, s/s, and their usual distance, s."""
     heard = np.isfinite(lag)
     if np.count_nonzero(heard) < _LEAST:
-        return 0.0, False
-    t, lag = t_s[heard], lag[heard]
-    if t[-1] - t[0] < _LEAST_S:
-        return 0.0, False
-    slope, offset, low, high = theilslopes(lag, t)
-    line = offset + slope * t
-    off = float(np.median(np.abs(lag - line)))
-    leaves = float(np.abs(line[[0, -1]]).max()) > _BEYOND * allowed
-    grows = abs(slope) * (t[-1] - t[0]) > allowed and low * high > 0.0
-    steady = off < allowed and abs(slope) < _MOST_DRIFT
-    return float(slope), leaves and grows and steady
+        return 0.0, 0.0
+    t_s, lag = t_s[heard], lag[heard]
+    slope, offset, _, _ = theilslopes(lag, t_s)
+    return float(slope), float(np.median(np.abs(lag - offset - slope * t_s)))
