@@ -197,8 +197,8 @@ def _median(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _names(channels: Sequence[int]) -> str:
-    word = "channel" if len(channels) == 1 else "channels"
-    return f"{word} {' and '.join(str(k + 1) for k in channels)}"
+    *first, last = (str(k + 1) for k in channels)
+    return f"channels {', '.join(first)} and {last}" if first else f"channel {last}"
 
 
 def recording_drift(
