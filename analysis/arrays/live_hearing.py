@@ -33,6 +33,9 @@ from systems.framework.input_error import InputError
 # Kinds of faults that make bearings wrong. Only the user can correct them.
 _FATAL = ("copied", "swapped", "units", "drift")
 
+# Least number of channels that go on without a dead one.
+_LEAST_LEFT = 3
+
 # Least power that a level expresses, relative to full scale: -120 dB.
 _QUIET = 1e-12
 
@@ -185,6 +188,9 @@ class LiveHearing:
     def _leave_out(self, fault: ChannelFault) -> None:
         self._alive = [k for k in self._alive if k not in fault.channels]
         try:
+            # Two of more microphones would silently confuse front and back.
+            if len(self._alive) < _LEAST_LEFT:
+                raise ValueError
             self._plan = self._voting(chosen_microphones(self._geometry, self._alive))
         except ValueError:
             raise self._end(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -59,11 +60,13 @@ def angle_off_deg(
     A row knows only the angle to its axis. Its bearing is compared with this angle.
     """
     true_deg = np.degrees(np.arctan2(truth[1], truth[0]))
-    if np.ptp(places[:, 1:]):
+    axes = np.linalg.svd(places - places.mean(axis=0))
+    if axes[1][1] > 1e-6:
         return abs(float((bearing_deg - true_deg + 180.0) % 360.0 - 180.0))
-    to_axis = np.degrees(np.arccos(truth[0] / np.linalg.norm(truth)))
-    told = np.degrees(np.arccos(np.cos(np.radians(bearing_deg))))
-    return abs(float(told - to_axis))
+    along, turn = axes[2][0], math.radians(bearing_deg)
+    to_axis = math.degrees(math.acos(along @ truth / np.linalg.norm(truth)))
+    told = math.acos(along @ [math.cos(turn), math.sin(turn), 0.0])
+    return abs(math.degrees(told) - to_axis)
 
 
 def streamed(

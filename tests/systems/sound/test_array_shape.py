@@ -111,7 +111,7 @@ def test_pairs_and_delays():
 @pytest.mark.parametrize(
     ("places", "words"),
     [
-        (ROW[:2], "2 given; a source takes at least 3"),
+        (ROW[:1], "1 given; a direction takes at least 2"),
         ([[0, 0], [0.1, 0], [0.1, 0.0005]], "numbers 2 and 3 are 0.5 mm apart"),
         ([[0, 0], [0, math.nan], [1, 1]], "number 2 is not finite"),
         ([0.0, 0.1, 0.2], "give \\(x, y\\) or"),
