@@ -219,9 +219,7 @@ def recording_drift(
     return clock_drift((starts + 0.5 * size) / sample_rate_hz, lags, p_AM, c)
 
 
-def _line(
-    t_s: NDArray[np.float64], lag: NDArray[np.float64]
-) -> tuple[float, float]:
+def _line(t_s: NDArray[np.float64], lag: NDArray[np.float64]) -> tuple[float, float]:
     """Returns the slope of a line through delays, s/s, and their usual distance, s."""
     heard = np.isfinite(lag)
     if np.count_nonzero(heard) < _LEAST:

@@ -31,8 +31,7 @@ _MISFIT_SAMPLES, _MISFIT_SHARE = 0.25, 0.05
 _SILENCE, _SILENT = 16, 1e-6
 _TAPS, _DIFFERENT = 129, 1e-3
 
-# Microphones that are symmetrical to each other are at most this share of their distance
-# off.
+# Largest deviation of two microphones from symmetry, as a share of their distance.
 _ALIKE = 1e-3
 
 # Powers at equal distances from a source differ by less than the share _LOUDER. The

@@ -188,11 +188,13 @@ class LiveHearing:
     def _leave_out(self, fault: ChannelFault) -> None:
         self._alive = [k for k in self._alive if k not in fault.channels]
         try:
-            # Two of more microphones would silently confuse front and back.
-            if len(self._alive) < _LEAST_LEFT:
-                raise ValueError
-            self._plan = self._voting(chosen_microphones(self._geometry, self._alive))
+            left = chosen_microphones(self._geometry, self._alive)
         except ValueError:
+            left = None
+        # Two channels that are left would silently confuse front and back.
+        if left is not None and len(self._alive) >= _LEAST_LEFT:
+            self._plan = self._voting(left)
+        else:
             raise self._end(
                 f"{fault.message}; the remaining channels give no bearings"
             ) from None

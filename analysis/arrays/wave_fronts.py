@@ -160,9 +160,7 @@ def _left_of_fit(
         by_u -= np.einsum("kna,ka->kn", by_u, u)[:, :, np.newaxis] * u[:, np.newaxis]
         by_w = (square + path * np.sum(p * to_source, axis=2) / rho) / (rho + 1.0)
         slopes = np.concatenate((by_u, by_w[:, :, np.newaxis]), axis=2)
-        slopes = np.stack(
-            [_centered(slopes[:, :, k], heard) for k in range(4)], axis=2
-        )
+        slopes = np.stack([_centered(slopes[:, :, k], heard) for k in range(4)], axis=2)
         information = np.einsum("kna,knb->kab", slopes, slopes)
         scale = np.trace(information[:, :3, :3], axis1=1, axis2=2)
         damping = _DAMPING * scale[:, np.newaxis, np.newaxis] * np.eye(4)

@@ -53,11 +53,12 @@ def heard_moving(
     fine_t = np.arange(fine.size) / (_FINER * rate)
     heard = _tail(sound, rate, moving.shape[1], t60_s)
     for image, gain in _images(path + CENTER_M, t60_s):
-        for k, row in enumerate(heard):
+        for k in range(len(heard)):
             at = [np.interp(points, steps, x) for x in moving[:, k].T]
             distance = np.linalg.norm(image - CENTER_M - np.stack(at, axis=1), axis=1)
             r = np.interp(t, points, distance)
-            row += gain / r * np.interp(t - r / SOUND_SPEED_M_S, fine_t, fine, left=0.0)
+            late = np.interp(t - r / SOUND_SPEED_M_S, fine_t, fine, left=0.0)
+            heard[k] += gain / r * late
     return heard
 
 

@@ -105,11 +105,14 @@ class Motion(NamedTuple):
 def _judge(motion: Motion) -> Outcome:
     said, told = _heard(motion)
     if motion.drifting:
-        names = " and ".join(str(k + 1) for k in motion.drifting)
-        right = "drift" in said and (f"channels {names}:" in said.replace("el ", "els "))
+        *first, last = (str(k + 1) for k in motion.drifting)
+        names = (
+            f"channels {', '.join(first)} and {last}" if first else f"channel {last}"
+        )
+        right = f"{names}: " in said and "drifts" in said
         return Outcome(right, said or "no drift")
     if said:
-        return Outcome(False, said)
+        return Outcome(right=False, said=said)
     path, places = motion.path(), ARRAYS[motion.array]
     good = [
         angle_off_deg(bearing, path[min(round(t * _PLACES_HZ), len(path) - 1)], places)
@@ -188,14 +191,19 @@ _DRIFTS = [
     Motion(_SMALL, "rest", 0, 60.0, drift_ppm=20.0, drifting=(1,)),
     Motion("square 1 m", "rest", 0, 60.0, drift_ppm=20.0, drifting=(3,)),
     Motion(
-        _SMALL, "rest", 0, 20.0, t60_s=0.3, sound="speech", drift_ppm=50.0, drifting=(1,)
+        _SMALL,
+        "rest",
+        0,
+        20.0,
+        t60_s=0.3,
+        sound="speech",
+        drift_ppm=50.0,
+        drifting=(1,),
     ),
     Motion(
         "circle of 6", "rest", 0, 20.0, sound="speech", drift_ppm=50.0, drifting=(3,)
     ),
-    Motion(
-        _SMALL, "rest", 0, 20.0, drift_ppm=50.0, drifting=(2, 3), command="listen"
-    ),
+    Motion(_SMALL, "rest", 0, 20.0, drift_ppm=50.0, drifting=(2, 3), command="listen"),
 ]
 
 

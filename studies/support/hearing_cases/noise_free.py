@@ -41,8 +41,8 @@ class Still(NamedTuple):
         """Says all of this in a few words."""
         copied = f", channel {self.copied} copied" if self.copied else ""
         return (
-            f"{self.array}, {self.sound} from {self.bearing_deg:g} deg, {self.rate} Hz, "
-            f"T60 {self.t60_s:g} s, SNR {self.snr_db:g} dB, {self.bits} bits{copied}"
+            f"{self.array}, {self.sound} from {self.bearing_deg:g} deg, "
+            f"{self.rate} Hz, T60 {self.t60_s:g} s, SNR {self.snr_db:g} dB, {self.bits} bits{copied}"
         )
 
     def place(self) -> NDArray[np.float64]:
@@ -96,7 +96,8 @@ def judged(
     bearing, std = summary["bearing_deg"], summary["bearing_std_deg"]
     faults = "; ".join(fault.message for fault in result.faults)
     if copied or bearing is None:
-        return Outcome(False, faults or f"bearing {bearing}", copied is not None)
+        said = faults or f"bearing {bearing}"
+        return Outcome(right=False, said=said, false_claim=copied is not None)
     off = angle_off_deg(bearing, truth, places)
     false = [
         source
