@@ -14,6 +14,7 @@ all delays that drifting clocks may have reached.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -67,6 +68,12 @@ _TOGETHER = 0.5
 # of a moving source. They do not tell which channels drift.
 _MOVES = 0.12
 
+# A motion looks like two clocks that drift apart in these conditions:
+# - _STEADY_S: it lasts at least this time, s.
+# - _ALIKE: the slopes of the delays differ by at most this share of the largest.
+# - _FLAT_M: microphones within this distance of a line or plane count as on it, m.
+_STEADY_S, _ALIKE, _FLAT_M = 10.0, 0.15, 1e-3
+
 # Largest relative drift of a clock, s/s. A faster change has another cause.
 _MOST_DRIFT = 2e-3
 
@@ -104,6 +111,9 @@ def clock_drift(
 ) -> ChannelFault | None:
     """Finds channels whose delays leave those of any source further and further.
 
+    If the array has no spare delays, a fault of the kind ``moves`` says that a steady
+    motion could also be a drift.
+
     The delays ``lags`` are the results of ``common_lags`` for k stretches, with the
     shape (k, n - 1), and ``t_s`` are the middles of the stretches. ``p_AM`` contains
     the positions of all microphones, m. If the n channels are not all channels,
@@ -119,32 +129,81 @@ def clock_drift(
     misfits = wave_front_misfits(lags, places, c)
     # The delays may leave those of a source only in the second half of the time.
     parts = (misfits, misfits[-max(_LEAST, len(t_s) // 2) :])
-    if not any(_leaves(part, places, c) for part in parts):
-        return None
-    lines = [_line(t_s, lag) for lag in lags.T]
-    slopes = np.array([0.0, *(slope for slope, _ in lines)])
-    fastest = slopes[np.abs(slopes).argmax()]
-    if not 0.0 < abs(fastest) < _MOST_DRIFT:
-        return None
-    if max(off for _, off in lines) > _MOVES * abs(fastest) * (t_s[-1] - t_s[0]):
+    leaves = any(_leaves(part, places, c) for part in parts)
+    growth = _Growth.of(t_s, lags)
+    if leaves and not growth.linear:
         return ChannelFault(
             "drift",
             (),
             "channels: their clocks drift apart, because their delays fit a source "
             "less and less; record all channels with one clock",
         )
-    drifting = slopes / fastest > _TOGETHER
     late, others = (
-        [k for k, drifts in zip(numbers, drifting, strict=True) if drifts == which]
-        for which in (True, False)
+        [k for k, drifts in zip(numbers, growth.drifting, strict=True) if drifts == one]
+        for one in (True, False)
     )
-    clock = "its clock drifts" if len(late) == 1 else "their clock drifts"
-    return ChannelFault(
-        "drift",
-        tuple(late),
-        f"{_names(late)}: {clock} from that of {_names(others)} by "
-        f"{1e6 * abs(fastest):.0f} us per second; record all channels with one clock",
-    )
+    by = f"by {1e6 * growth.fastest:.0f} us per second"
+    if leaves and growth.fastest < _MOST_DRIFT:
+        clock = "its clock drifts" if len(late) == 1 else "their clock drifts"
+        return ChannelFault(
+            "drift",
+            tuple(late),
+            f"{_names(late)}: {clock} from that of {_names(others)} {by}; record all "
+            "channels with one clock",
+        )
+    spare = len(places) - 1 - np.linalg.matrix_rank(places - places[0], tol=_FLAT_M)
+    if not leaves and spare <= 0 and growth.imitates:
+        return ChannelFault(
+            "moves",
+            tuple(late),
+            f"{_names(late)}: delays change steadily {by}: the source moves, or the "
+            f"clock drifts from that of {_names(others)}; record all channels with one "
+            "clock to be sure",
+        )
+    return None
+
+
+@dataclass(frozen=True)
+class _Growth:
+    """Straight lines through the delays of all channels."""
+
+    slopes: NDArray[np.float64]
+    """(n,) slopes relative to channel 0, s/s."""
+    off_s: float
+    """Largest usual distance of a delay from its line, s."""
+    seconds: float
+    """Time from the first to the last stretch, s."""
+
+    @classmethod
+    def of(cls, t_s: NDArray[np.float64], lags: NDArray[np.float64]) -> _Growth:
+        lines = [_line(t_s, lag) for lag in lags.T]
+        slopes = np.array([0.0, *(slope for slope, _ in lines)])
+        return cls(slopes, max(off for _, off in lines), float(t_s[-1] - t_s[0]))
+
+    @property
+    def fastest(self) -> float:
+        """Largest magnitude of a slope, s/s."""
+        return float(np.abs(self.slopes).max())
+
+    @property
+    def linear(self) -> bool:
+        """Whether the delays are on straight lines, unlike those of most motions."""
+        return self.fastest > 0.0 and self.off_s <= _MOVES * self.fastest * self.seconds
+
+    @property
+    def drifting(self) -> NDArray[np.bool_]:
+        """(n,) whether each channel drifts together with the fastest."""
+        fastest = self.slopes[np.abs(self.slopes).argmax()]
+        return np.asarray(self.slopes / (fastest or 1.0) > _TOGETHER)
+
+    @property
+    def imitates(self) -> bool:
+        """Whether a motion is so steady, and so alike in channels, as two clocks."""
+        if not self.linear or self.seconds < _STEADY_S:
+            return False
+        share = np.abs(self.slopes) / self.fastest
+        alike = np.all(np.minimum(share, np.abs(1.0 - share)) < _ALIKE)
+        return bool(alike) and self.fastest * self.seconds > _GROWTH_S
 
 
 def _without_echoes(

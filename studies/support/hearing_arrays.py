@@ -35,6 +35,8 @@ ARRAYS: dict[str, NDArray[np.float64]] = {
     "row of 3": row(-0.1, 0.0, 0.1),
     "pair 10 cm": row(-0.05, 0.05),
     "pair 20 cm": row(-0.1, 0.1),
+    "pair 1 m": row(-0.5, 0.5),
+    "triangle 1 m": circle(3, 1.0),
     "triangle 10 cm": circle(3, 0.1154),
     "circle of 6": circle(6, 0.093),
     "circle of 8": circle(8, 0.2),

@@ -106,10 +106,8 @@ def _judge(motion: Motion) -> Outcome:
     said, told = _heard(motion)
     if motion.drifting:
         *first, last = (str(k + 1) for k in motion.drifting)
-        names = (
-            f"channels {', '.join(first)} and {last}" if first else f"channel {last}"
-        )
-        right = f"{names}: " in said and "drifts" in said
+        names = f"channels {', '.join(first)} and" if first else "channel"
+        right = f"{names} {last}: " in said and "drifts" in said
         return Outcome(right, said or "no drift")
     if said:
         return Outcome(right=False, said=said)
@@ -204,6 +202,9 @@ _DRIFTS = [
         "circle of 6", "rest", 0, 20.0, sound="speech", drift_ppm=50.0, drifting=(3,)
     ),
     Motion(_SMALL, "rest", 0, 20.0, drift_ppm=50.0, drifting=(2, 3), command="listen"),
+    # A source could move in the same way. This must be said, but is no refusal.
+    Motion("triangle 1 m", "rest", 0, 20.0, drift_ppm=50.0, drifting=(1,)),
+    Motion("pair 1 m", "rest", 0, 20.0, drift_ppm=-50.0, drifting=(1,)),
 ]
 
 

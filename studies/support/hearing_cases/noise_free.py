@@ -42,7 +42,8 @@ class Still(NamedTuple):
         copied = f", channel {self.copied} copied" if self.copied else ""
         return (
             f"{self.array}, {self.sound} from {self.bearing_deg:g} deg, "
-            f"{self.rate} Hz, T60 {self.t60_s:g} s, SNR {self.snr_db:g} dB, {self.bits} bits{copied}"
+            f"{self.rate} Hz, T60 {self.t60_s:g} s, SNR {self.snr_db:g} dB, "
+            f"{self.bits} bits{copied}"
         )
 
     def place(self) -> NDArray[np.float64]:

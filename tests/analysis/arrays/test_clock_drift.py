@@ -158,6 +158,23 @@ def test_delays_too_long_for_any_source_are_a_drift():
     assert fault.channels == (2,)
 
 
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_drift_that_a_source_explains_is_named_as_a_motion_or_a_drift(count):
+    """1 ms of 20 s, of the 2.9 ms that sound takes along 1 m."""
+    places = ring(count, 1.0)
+    t_s = np.arange(0.25, 20.0, 0.5)
+    path = circling(t_s, 0.0)[:, [1, 0, 2]]
+    lags = arrivals_of(path, places)
+    lags[:, 0] += 50e-6 * t_s
+    fault = clock_drift(t_s, rounded(lags), places, SOUND_SPEED)
+    assert fault is not None
+    assert (fault.kind, fault.channels) == ("moves", (1,))
+    assert "by 50 us per second: the source moves, or the clock drifts" in fault.message
+    # Without a drift there is nothing to say, and neither is there of more microphones.
+    rest = rounded(arrivals_of(path, places))
+    assert clock_drift(t_s, rest, places, SOUND_SPEED) is None
+
+
 @pytest.mark.parametrize("name", ARRAYS)
 @pytest.mark.parametrize("far", [0.8, 1.5, 20.0])
 def test_wave_fronts_of_sources_leave_nothing(name, far):
