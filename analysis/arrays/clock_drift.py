@@ -72,7 +72,8 @@ _MOVES = 0.12
 # - _STEADY_S: it lasts at least this time, s.
 # - _ALIKE: the slopes of the delays differ by at most this share of the largest.
 # - _FLAT_M: microphones within this distance of a line or plane count as on it, m.
-_STEADY_S, _ALIKE, _FLAT_M = 10.0, 0.15, 1e-3
+# - _CURVED_M: from this aperture on, delays also depend on the range, m.
+_STEADY_S, _ALIKE, _FLAT_M, _CURVED_M = 10.0, 0.15, 1e-3, 0.5
 
 # Largest relative drift of a clock, s/s. A faster change has another cause.
 _MOST_DRIFT = 2e-3
@@ -151,8 +152,7 @@ def clock_drift(
             f"{_names(late)}: {clock} from that of {_names(others)} {by}; record all "
             "channels with one clock",
         )
-    spare = len(places) - 1 - np.linalg.matrix_rank(places - places[0], tol=_FLAT_M)
-    if not leaves and spare <= 0 and growth.imitates:
+    if not leaves and _spare_delays(places) <= 0 and growth.imitates:
         return ChannelFault(
             "moves",
             tuple(late),
@@ -206,6 +206,16 @@ class _Growth:
         return bool(alike) and self.fastest * self.seconds > _GROWTH_S
 
 
+def _spare_delays(places: NDArray[np.float64]) -> int:
+    """Returns how many delays a source does not explain by its direction, and range.
+
+    The range counts only if the array is so large that waves are curved.
+    """
+    aperture = float(np.linalg.norm(places[:, np.newaxis] - places, axis=2).max())
+    angles = int(np.linalg.matrix_rank(places - places[0], tol=_FLAT_M))
+    return len(places) - 1 - angles - (aperture > _CURVED_M)
+
+
 def _without_echoes(
     lags: NDArray[np.float64], allowed_s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -216,8 +226,8 @@ def _without_echoes(
     """
     padded = np.pad(lags, ((_BESIDE, _BESIDE), (0, 0)), constant_values=np.nan)
     windows = sliding_window_view(padded, 2 * _BESIDE + 1, axis=0)
-    known = np.isfinite(windows).any(axis=2)
-    usual = np.nanmedian(np.where(known[:, :, np.newaxis], windows, 0.0), axis=2)
+    known = np.asarray(np.isfinite(windows).any(axis=2, keepdims=True))
+    usual = np.nanmedian(np.where(known, windows, 0.0), axis=2)
     off = np.abs(lags - usual)
     return np.where(off < 2.0 * allowed_s + _GROWTH_S, lags, np.nan)
 

@@ -83,7 +83,7 @@ def copied_microphones(
 
 def _louder(block: NDArray[np.float64]) -> float:
     powers = np.var(block, axis=1)
-    return float(np.ptp(powers) / powers.max())
+    return 1.0 - float(powers.min()) / float(powers.max())
 
 
 def _loudest(samples: NDArray[np.float64], size: int) -> NDArray[np.float64]:

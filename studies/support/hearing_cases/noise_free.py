@@ -139,18 +139,13 @@ _STILL = [
     Still("circle of 6", 90.0, "speech", t60_s=0.2),
     *(Still("triangle 10 cm", b, "speech", snr_db=25.0) for b in (20.0, 100.0, -70.0)),
     Still("triangle 10 cm", 20.0, "speech", t60_s=0.3, snr_db=25.0),
-    *(
-        Still(array, bearing, sound, snr_db=25.0, copied=copied, t60_s=t60_s)
-        for array, bearing, sound, copied, t60_s in (
-            ("square 4.6 cm", 20.0, "speech", (0, 1), 0.0),
-            ("square 4.6 cm", 90.0, "noise", (0, 1), 0.3),
-            ("triangle 10 cm", 60.0, "speech", (0, 1), 0.3),
-            ("triangle 10 cm", 10.0, "speech", (1, 2), 0.3),
-            ("circle of 6", 0.0, "speech", (1, 5), 0.0),
-            ("row of 4", 70.0, "noise", (0, 3), 0.3),
-            ("tetrahedron", 45.0, "speech", (2, 3), 0.2),
-        )
-    ),
+    Still("square 4.6 cm", 20.0, "speech", snr_db=25.0, copied=(0, 1)),
+    Still("square 4.6 cm", 90.0, t60_s=0.3, snr_db=25.0, copied=(0, 1)),
+    Still("triangle 10 cm", 60.0, "speech", t60_s=0.3, snr_db=25.0, copied=(0, 1)),
+    Still("triangle 10 cm", 10.0, "speech", t60_s=0.3, snr_db=25.0, copied=(1, 2)),
+    Still("circle of 6", 0.0, "speech", snr_db=25.0, copied=(1, 5)),
+    Still("row of 4", 70.0, t60_s=0.3, snr_db=25.0, copied=(0, 3)),
+    Still("tetrahedron", 45.0, "speech", t60_s=0.2, snr_db=25.0, copied=(2, 3)),
     Still("square 4.6 cm", 20.0, "speech", copied=(0, 1)),
     Still("circle of 8", 30.0, "speech", copied=(2, 3), t60_s=0.3),
 ]

@@ -110,8 +110,8 @@ def test_two_microphones_are_a_row():
     assert shape.ahead == pytest.approx([1.0, 0.0])
     assert shape.freedom < 0
     assert shape.facing("behind").ahead == pytest.approx([-1.0, 0.0])
-    assert ArrayShape.of([[0, 0, 0], [0, 0, 0.2]]).angles == ("elevation",)
-    assert ArrayShape.of([[0, 0, 0], [0.1, 0, 0.2]]).angles == ()
+    assert ArrayShape.of([[0.0, 0.0, 0.0], [0.0, 0.0, 0.2]]).angles == ("elevation",)
+    assert ArrayShape.of([[0.0, 0.0, 0.0], [0.1, 0.0, 0.2]]).angles == ()
 
 
 def test_pairs_and_delays():
