@@ -29,7 +29,7 @@ _MISFIT_SAMPLES, _MISFIT_SHARE = 0.25, 0.05
 # - A filter of _TAPS samples turns one channel into another, except for the share
 #   _DIFFERENT of its power. Noise and reverberation have a larger share.
 _SILENCE, _SILENT = 16, 1e-6
-_TAPS, _DIFFERENT = 129, 1e-3
+_TAPS, _DIFFERENT = 129, 3e-5
 
 # Largest deviation of two microphones from symmetry, as a share of their distance.
 _ALIKE = 1e-3
@@ -82,8 +82,9 @@ def copied_microphones(
 
 
 def _louder(block: NDArray[np.float64]) -> float:
-    powers = np.var(block, axis=1)
-    return 1.0 - float(powers.min()) / float(powers.max())
+    """Returns by which share of its power the loudest channel exceeds the faintest."""
+    powers = [float(np.var(channel)) for channel in block]
+    return 1.0 - min(powers) / max(powers)
 
 
 def _loudest(samples: NDArray[np.float64], size: int) -> NDArray[np.float64]:
@@ -125,7 +126,7 @@ def _difference(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     rows = np.lib.stride_tricks.sliding_window_view(one, _TAPS)
     wanted = other[half : half + len(rows)]
     taps = np.linalg.lstsq(rows, wanted, rcond=1e-6)[0]
-    return float(np.var(wanted - rows @ taps) / max(np.var(wanted), 1e-300))
+    return float(np.var(wanted - rows @ taps)) / max(float(np.var(wanted)), 1e-300)
 
 
 def _symmetrical(
