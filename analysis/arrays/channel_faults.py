@@ -4,7 +4,7 @@ There are these checks:
 
 - Each channel alone: whether it has NaN values, is constant, or is clipped.
 - Pairs of channels: whether one is a copy of the other
-  (``systems.delays.copied_channels``).
+  (``analysis.arrays.copied_microphones``).
 - Each channel compared with the others: its level, and the height and the sign of its
   correlation with them.
 - The delays of all channels: whether they match the size of the array, and whether
@@ -24,6 +24,7 @@ from analysis.arrays.array_geometry import (
     KnownArray,
     usable_band,
 )
+from analysis.arrays.copied_microphones import copied_microphones
 from analysis.arrays.frame_delays import (
     REACHES_M,
     DelayScale,
@@ -33,7 +34,6 @@ from analysis.arrays.frame_delays import (
     misfit,
 )
 from analysis.arrays.pair_correlations import PairCorrelations, correlate_pairs
-from systems.delays.copied_channels import copied_pairs
 from systems.sound.array_shape import ArrayShape
 
 # _DEAD_DB: a channel is dead if it is more than this below the second loudest of the
@@ -76,7 +76,7 @@ _LEAD = 0.1
 
 _Kind = Literal[
     "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
-    "units", "size", "late", "drift"
+    "units", "size", "late", "drift", "moves"
 ]  # fmt: skip
 
 
@@ -113,7 +113,7 @@ def find_channel_faults(
     if use.size < 2:
         return found
     readable = samples if use.size == len(samples) else samples[use]
-    found += _copied(readable, use, sample_rate_hz)
+    found += _copied(readable, use, sample_rate_hz, array)
     band_hz = usable_band(band_hz, sample_rate_hz, highest_hz=HIGHEST_FAULTS_HZ)
     measured = correlate_pairs(readable, shape.max_delay(c), sample_rate_hz, band_hz)
     if measured is None:
@@ -171,14 +171,19 @@ def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
 
 
 def _copied(
-    samples: NDArray[np.float64], use: NDArray[np.int64], sample_rate_hz: float
+    samples: NDArray[np.float64],
+    use: NDArray[np.int64],
+    sample_rate_hz: float,
+    array: KnownArray,
 ) -> list[ChannelFault]:
     faults = []
-    for pair in copied_pairs(samples, sample_rate_hz):
+    places = array.shape.p_AM[use]
+    for pair in copied_microphones(samples, sample_rate_hz, places, array.c):
         i, j = use[list(pair)].tolist()
         text = (
             f"channels {i + 1} and {j + 1}: their samples are equal apart from gain "
-            "and delay; record every microphone on its own channel"
+            "and delay; record every microphone on its own channel, or add noise to "
+            "a simulation"
         )
         faults.append(ChannelFault("copied", (i, j), text))
     return faults

@@ -175,8 +175,9 @@ def _levels_db(stretch: NDArray[np.float32]) -> NDArray[np.float64]:
 
 
 def _heard_db(stretch: NDArray[np.float32]) -> float:
-    """Returns the second highest level of the channels, dB.
+    """Returns the second highest level of three or more channels, dB.
 
-    The highest level is not used, because the source may be at one microphone.
+    The highest level is not used, because the source may be at one microphone. Of two
+    channels, the second may be dead, and the result is the higher level.
     """
-    return float(np.sort(_levels_db(stretch))[-2])
+    return float(np.sort(_levels_db(stretch))[-min(2, len(stretch) - 1)])

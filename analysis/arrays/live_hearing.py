@@ -33,6 +33,9 @@ from systems.framework.input_error import InputError
 # Kinds of faults that make bearings wrong. Only the user can correct them.
 _FATAL = ("copied", "swapped", "units", "drift")
 
+# Least number of channels that go on without a dead one.
+_LEAST_LEFT = 3
+
 # Least power that a level expresses, relative to full scale: -120 dB.
 _QUIET = 1e-12
 
@@ -185,8 +188,13 @@ class LiveHearing:
     def _leave_out(self, fault: ChannelFault) -> None:
         self._alive = [k for k in self._alive if k not in fault.channels]
         try:
-            self._plan = self._voting(chosen_microphones(self._geometry, self._alive))
+            left = chosen_microphones(self._geometry, self._alive)
         except ValueError:
+            left = None
+        # Two channels that are left would silently confuse front and back.
+        if left is not None and len(self._alive) >= _LEAST_LEFT:
+            self._plan = self._voting(left)
+        else:
             raise self._end(
                 f"{fault.message}; the remaining channels give no bearings"
             ) from None

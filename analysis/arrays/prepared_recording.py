@@ -88,15 +88,13 @@ def prepared_recording(
     drift = None
     if trusts_positions:
         drift = recording_drift(channels, float(rate), shape.p_AM, known.c)
+    faults = [] if drift is None else [drift]
     # The delays of drifting channels fit no position, so no other check of delays
     # applies.
-    faults = (
-        [drift]
-        if drift
-        else find_channel_faults(
+    if drift is None or drift.kind != "drift":
+        faults += find_channel_faults(
             channels, known, sample_rate_hz=float(rate), band_hz=geometry.band
         )
-    )
     if not trusts_positions:
         faults = [fault for fault in faults if fault.kind != "swapped"]
     channels, faults = channels_without_faults(channels, faults, agreement, where)

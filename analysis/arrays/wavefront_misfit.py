@@ -65,7 +65,8 @@ def channel_lateness(
 ) -> Lateness | None:
     """Estimates how late each channel is, from the misfit of the wave fronts.
 
-    The result is None if there are too few stretches.
+    The result is None if there are too few stretches, or if any delays fit a wave
+    front, for example those of three microphones in a triangle.
     """
     every = -(-len(sightings) // _MOST_STRETCHES) or 1
     chosen = sightings[::every]
@@ -74,6 +75,8 @@ def channel_lateness(
     shape = array.shape
     if shape.dimension == 2:
         shape = ArrayShape.of(np.pad(shape.p_AM, ((0, 0), (0, 1))))
+    if shape.freedom + 1 <= 0:  # The prior of the range counts as one more value.
+        return None
     found = [_of_stretch(sighting, shape, array) for sighting in chosen]
     late, info, alike, misfit = (np.array(part) for part in zip(*found, strict=True))
     middle = np.median(late, axis=0)

@@ -68,7 +68,7 @@ class ArrayShape:
         """Makes the shape of an array from the positions of its microphones.
 
         Args:
-            positions: (n, 2) or (n, 3) positions in any frame, m; n is at least 3.
+            positions: (n, 2) or (n, 3) positions in any frame, m; n is at least 2.
             flat_m: The microphones form a row or plane if none of them is farther than
                 this distance from a line or plane, m. None: 1 % of the aperture.
 
@@ -77,7 +77,7 @@ class ArrayShape:
             that they span.
 
         Raises:
-            InputError: There are fewer than 3 positions, two positions nearly coincide,
+            InputError: There are fewer than 2 positions, two positions nearly coincide,
                 a position is not finite, or the shape of the positions is wrong.
         """
         p = np.array(positions, dtype=np.float64)
@@ -223,8 +223,8 @@ class ArrayShape:
 
 
 def _check(p: NDArray[np.float64]) -> None:
-    if len(p) < 3:
-        raise InputError("microphones", f"{len(p)} given; a source takes at least 3")
+    if len(p) < 2:
+        raise InputError("microphones", f"{len(p)} given; a direction takes at least 2")
     wrong = np.flatnonzero(~np.isfinite(p).all(axis=1))
     if wrong.size:
         raise InputError(

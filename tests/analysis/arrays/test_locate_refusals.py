@@ -66,7 +66,7 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         ("", "lists no microphones"),
         ("- 1\n- 2\n", "lists no microphones"),
         ("microphones: [[0, 1], [0, 0]\n", "is not usable as YAML"),
-        ("microphones: [[0, 1], [0, 0]]\n", "2 given.*at least 3"),
+        ("microphones: [[0, 1]]\n", "1 given.*at least 2"),
         ("microphones: [[0, 1], [0, 0], [0, 1]]\n", "1 and 3 are 0 mm apart"),
         ("microphones: [[0, .nan], [0, 0], [0, -0.4]]\n", "finite"),
         ("microphones: [[0, 400], [0, 0], [0, -400]]\n", "800 m apart.*in m"),

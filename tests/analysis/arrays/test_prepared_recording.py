@@ -40,9 +40,9 @@ def test_covariances_of_all_keep_their_rows():
     np.testing.assert_allclose(kept, matrix[2:, 2:])
 
 
-def test_two_are_too_few():
+def test_one_is_too_few():
     with pytest.raises((InputError, ValueError), match="microphones"):
-        chosen_microphones(ArrayGeometry(microphones=PLACES), (0, 1))
+        chosen_microphones(ArrayGeometry(microphones=PLACES), (0,))
 
 
 SAMPLES = np.arange(12.0).reshape(3, 4) - 5.0

@@ -99,6 +99,22 @@ def test_a_small_row_of_three_sees_that_waves_are_not_flat():
     assert fault is not None
 
 
+@pytest.mark.parametrize("elevation_deg", [0.0, 10.0, 60.0])
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.filterwarnings("error")
+def test_three_in_a_triangle_have_no_spare_delay(elevation_deg, dimension):
+    """Two delays are two unknowns of a plane wave, and a late channel turns it."""
+    turn = 2.0 * np.pi / 3.0 * np.arange(3)
+    triangle = 0.0577 * np.stack((np.cos(turn), np.sin(turn)), axis=1)
+    places = np.pad(triangle, ((0, 0), (0, dimension - 2)))
+    rise = np.tan(np.radians(elevation_deg))
+    for late_us in (0.0, 60.0):
+        for seed in range(5):
+            stretches = sightings(places, late_us, 1, seed=seed, rise=rise)
+            assert channel_lateness(stretches, known(places)) is None
+            assert late_channel(stretches, known(places)) is None
+
+
 @pytest.mark.parametrize("channel", [0, 1, 2])
 def test_a_long_row_of_three_has_nothing_to_tell_it_by(channel):
     """Any two delays are of some bearing and range."""

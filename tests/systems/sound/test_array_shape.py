@@ -100,6 +100,20 @@ def test_three_in_a_row_are_known_in_any_order():
         assert ArrayShape.of(other).equal_row is None
 
 
+def test_two_microphones_are_a_row():
+    shape = ArrayShape.of([[0.0, -0.1], [0.0, 0.1]])
+    assert (shape.kind, shape.ambiguity, shape.angles) == (
+        "row",
+        "front_back",
+        ("bearing",),
+    )
+    assert shape.ahead == pytest.approx([1.0, 0.0])
+    assert shape.freedom < 0
+    assert shape.facing("behind").ahead == pytest.approx([-1.0, 0.0])
+    assert ArrayShape.of([[0.0, 0.0, 0.0], [0.0, 0.0, 0.2]]).angles == ("elevation",)
+    assert ArrayShape.of([[0.0, 0.0, 0.0], [0.1, 0.0, 0.2]]).angles == ()
+
+
 def test_pairs_and_delays():
     shape = ArrayShape.of(SQUARE)
     assert shape.pairs.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
@@ -111,7 +125,7 @@ def test_pairs_and_delays():
 @pytest.mark.parametrize(
     ("places", "words"),
     [
-        (ROW[:2], "2 given; a source takes at least 3"),
+        (ROW[:1], "1 given; a direction takes at least 2"),
         ([[0, 0], [0.1, 0], [0.1, 0.0005]], "numbers 2 and 3 are 0.5 mm apart"),
         ([[0, 0], [0, math.nan], [1, 1]], "number 2 is not finite"),
         ([0.0, 0.1, 0.2], "give \\(x, y\\) or"),
