@@ -51,8 +51,8 @@ from diagrams.running.stop_rules import SUCCESSFUL
 #: Limits that keep a page readable.
 #: MOST_MAPS: greatest number of heat maps.
 #: MOST_ERRORS: greatest number of commands for runs that raised an error.
-#: MOST_OTHERS: greatest number of commands for each other cause of failure.
-MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
+#: MOST_OTHERS: greatest number of commands for each other cause of failure and cell.
+MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 3
 
 
 def write_batch(batch: Batch, document: dict[str, Any]) -> None:
@@ -309,24 +309,43 @@ def _examples(
 
 
 def _commands(batch: Batch, summary: Summary) -> list[Content]:
-    """Returns commands that repeat the first failed runs of each cause."""
+    """Returns commands that repeat failed runs of each cause and cell.
+
+    A failure is of more interest the fewer failures its cell has. In a cell, failures
+    by the robot's own fault come first.
+    """
     parts: list[Content] = ["Each command repeats one run and makes its replay."]
-    rows = summary.rows
-    causes = [c for c in rows["cause"].value_counts().index if c not in SUCCESSFUL]
+    cells = [
+        (cell.label, runs)
+        for cell, runs in zip(
+            summary.cells, by_cell(summary.plan, summary.rows), strict=True
+        )
+    ]
+    found = summary.rows["cause"].value_counts().index
+    causes = [cause for cause in found if cause not in SUCCESSFUL]
     for cause in sorted(causes, key=lambda cause: cause != FAILED):
-        runs = rows[rows["cause"] == cause]
-        caption = f"{cause}: {len(runs)} runs"
+        failures = [(label, runs[runs["cause"] == cause]) for label, runs in cells]
+        failures = [(label, runs) for label, runs in failures if len(runs)]
         most = MOST_ERRORS if cause == FAILED else MOST_OTHERS
-        if len(runs) > most:
-            caption += f", of which the first {most}"
-        lines = [
-            (
-                f"Run {row['index']}",
-                f"{_remark(row)}`{run_command(batch, summary.name, row)}`",
+        for label, runs in sorted(failures, key=lambda each: len(each[1])):
+            caption = (
+                f"{cause}, {label}: {len(runs)} runs"
+                if label
+                else (f"{cause}: {len(runs)} runs")
             )
-            for row in runs.head(most).to_dict("records")
-        ]
-        parts += [heading(caption), Definitions(lines)]
+            if len(runs) > most:
+                caption += f", of which {most}"
+            chosen = runs.sort_values(
+                "collision_fault", key=lambda fault: fault != "robot", kind="stable"
+            )
+            lines = [
+                (
+                    f"Run {row['index']}",
+                    f"{_remark(row)}`{run_command(batch, summary.name, row)}`",
+                )
+                for row in chosen.head(most).to_dict("records")
+            ]
+            parts += [heading(caption), Definitions(lines)]
     return parts if causes else []
 
 
