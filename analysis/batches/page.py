@@ -14,16 +14,18 @@ from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
 from analysis.batches.batch import MOST_CELLS, REPORT, SUMMARY, Batch, Summary
-from analysis.batches.cells import LEAST_RUNS, by_cell, cell_label
+from analysis.batches.cells import LEAST_BINS, by_cell, cell_label
 from analysis.batches.examples import picture_files, write_examples
 from analysis.batches.one_run import FAILED
 from analysis.batches.plan import SweepPlan
 from analysis.batches.plots import (
+    COLORS,
     grid_axes,
+    is_number,
     plot_cells,
     plot_heat_maps,
-    plot_line,
-    plot_marginal,
+    plot_panels,
+    split_field,
 )
 from analysis.batches.report import (
     counts_text,
@@ -236,12 +238,17 @@ def _maps(plan: SweepPlan, results: pd.DataFrame, prefix: str) -> list[Content]:
             caption = f"Every metric for each `{axes[0]}`."
             return [_figure(plot_cells(plan, results), f"{prefix}cells", caption)]
         caption = f"Every metric over `{axes[0]}`."
-        return [_figure(plot_line(plan, results, axes[0]), f"{prefix}line", caption)]
+        return [_figure(plot_panels(plan, results, axes[0]), f"{prefix}line", caption)]
     (x, y), others = _map_axes(plan)
     cases = [
         dict(zip(others, values, strict=True))
         for values in product(*(plan.grid[path] for path in others))
     ]
+    for over, by in ((x, y), (y, x)):
+        if is_number(plan, over) and len(plan.grid[by]) <= len(COLORS) and not others:
+            figure = plot_panels(plan, results, over, by)
+            caption = f"Every metric over `{over}`, with one curve per `{by}`."
+            return [_figure(figure, f"{prefix}curves", caption)]
     maps: list[Content] = [
         _figure(
             plot_heat_maps(plan, results, x, y, rest),
@@ -267,14 +274,16 @@ def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
 def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
     return [
         _figure(
-            plot_marginal(plan, results, key),
+            plot_panels(
+                plan, results, key.partition(",")[0].strip(), split_field(plan)
+            ),
             f"marginal{k}",
             f"Every metric over `{key}`, in bins with equal numbers of runs.",
         )
         for k, (key, drawn) in enumerate(plan.draw.items())
         # Lists of boxes are not numbers, and no list is drawn twice. Therefore the runs
-        # cannot be sorted by them. A single bin would show no dependence.
-        if drawn.boxes is None and len(results) >= 2 * LEAST_RUNS
+        # cannot be sorted by them. Bins of a single run would show no dependence.
+        if drawn.boxes is None and len(results) >= 2 * LEAST_BINS
     ]
 
 
