@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from analysis.batches.batch import (
     Batch,
@@ -16,9 +16,10 @@ from analysis.batches.batch import (
     prepare_comparison,
 )
 from analysis.batches.comparison_plans import EXPERIMENTS, comparison_plan
+from analysis.batches.figures import write_figures
 from analysis.batches.page import write_batch
 from analysis.batches.plan import SweepPlan, load_sweep
-from analysis.batches.plots import plot_cells
+from analysis.batches.plots import plot_cells, plot_over
 from analysis.batches.report import batch_document, batch_text, warning_lines
 from analysis.report.result_directory import whole_directory
 from phonotaxis.result import Prepared, Result, ignore
@@ -58,12 +59,59 @@ class BatchResult(Result):
         every = self.batch.summaries.values()
         return tuple(line for each in every for line in warning_lines(each))
 
-    def plot(self) -> dict[str, Figure]:
-        """Draws the rates and metrics of all cells, one figure for each scenario."""
-        return {
-            name: plot_cells(each.plan, each.rows)
-            for name, each in self.batch.summaries.items()
-        }
+    @overload
+    def plot(self) -> dict[str, Figure]: ...
+
+    @overload
+    def plot(
+        self, quantity: str, *, over: str, by: str = "", scenario: str = ""
+    ) -> Figure: ...
+
+    def plot(
+        self, quantity: str = "", *, over: str = "", by: str = "", scenario: str = ""
+    ) -> Figure | dict[str, Figure]:
+        """Draws one quantity over a field, or all quantities of all cells.
+
+        Example: ``found.plot("collision", over="source.speed_m_s", by="law")``. The
+        method ``savefig`` of the figure writes PDF, SVG and PNG files.
+
+        Args:
+            quantity: ``success``, ``collision``, or the name of a metric. Empty means
+                all rates and metrics of all cells, in one figure for each scenario.
+            over: Field on the horizontal axis: one of the grid, or a drawn field. A
+                drawn number is sorted into at least four bins of equal numbers of runs.
+            by: Field of the grid with one curve per value. Empty means one curve.
+            scenario: Scenario of a comparison. Empty means the first one.
+
+        Returns:
+            The figure with 95 % intervals; without a quantity, figures by scenario.
+
+        Raises:
+            InputError: The quantity, a field or the scenario is not part of the batch.
+        """
+        summaries = self.batch.summaries
+        if not quantity:
+            return {name: plot_cells(x.plan, x.rows) for name, x in summaries.items()}
+        chosen = summaries.get(scenario or next(iter(summaries)))
+        if chosen is None:
+            known = ", ".join(summaries)
+            raise InputError("scenario", f"{scenario!r} is not there; use {known}")
+        return plot_over(chosen.plan, chosen.rows, quantity, over, by)
+
+    def save_figures(self, directory: str | Path) -> list[Path]:
+        """Writes figures as PDF, SVG and PNG files, for papers.
+
+        There is one figure of all cells per scenario. For each number in the grid, and
+        for each drawn number, there are figures of the success rate and the collision
+        rate.
+
+        Args:
+            directory: Directory, which is created if it does not exist.
+
+        Returns:
+            Paths of the files.
+        """
+        return write_figures(self.batch, Path(directory))
 
     def write(self, document: dict[str, Any], directory: Path) -> None:
         """Writes the page, the JSON document and the examples into ``out``.

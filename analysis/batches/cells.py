@@ -36,9 +36,9 @@ from diagrams.running.stop_rules import SUCCESSFUL
 ExampleKind = Literal["worst", "typical", "best"]
 EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
 #: Bins into which ``marginal`` sorts the runs by the value of a drawn number.
-#: MOST_BINS: greatest number of bins.
-#: LEAST_RUNS: least number of runs per bin, if there is more than one bin.
-MOST_BINS, LEAST_RUNS = 8, 20
+#: LEAST_BINS, MOST_BINS: least and greatest number of bins.
+#: USUAL_RUNS: number of runs per bin between these two numbers.
+LEAST_BINS, MOST_BINS, USUAL_RUNS = 4, 8, 20
 #: A body was out of sight if its last echo came at least this number of ticks (control
 #: periods) before the contact. The last tick before the contact then had no echo of it.
 OUT_OF_SIGHT_TICKS = 1.5
@@ -307,7 +307,7 @@ def marginal(
             tuple(short(name) for name in names),
             tuple(quantity.estimate(runs[values == name]) for name in names),
         )
-    count = int(np.clip(len(runs) // LEAST_RUNS, 1, MOST_BINS))
+    count = int(np.clip(len(runs) // USUAL_RUNS, LEAST_BINS, MOST_BINS))
     parts = np.array_split(np.argsort(values.to_numpy(), kind="stable"), count)
     groups = [runs.iloc[part] for part in parts if len(part)]
     return Marginal(

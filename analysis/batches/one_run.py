@@ -188,6 +188,38 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
+def table_rows(
+    table: pd.DataFrame, points: Mapping[int, SweepPoint]
+) -> list[dict[str, Any]]:
+    """Returns the rows from which ``results_table`` has made a table.
+
+    The argument ``points`` contains the point of each run, by number of the run.
+    """
+    names = list(table.columns)
+    end, first = names.index("collision_time_s"), names.index(_TEXTS[-1])
+    robots = names[first + 1 : end]
+    metrics = names[end + 1 : names.index("simulated_s")]
+    rows, known = [], table.notna().to_numpy()
+    for number, values in enumerate(table.to_dict("records")):
+        given = zip(values.items(), known[number], strict=True)
+        plain = {name: value if is_known else None for (name, value), is_known in given}
+        rows.append(
+            {
+                **vars(points[int(table["index"].iloc[number])]),
+                **{name: plain[name] for name in _TEXTS},
+                "collision_time_s": plain["collision_time_s"],
+                "robots": {name: plain[name] for name in robots},
+                "metrics": {name: plain[name] for name in metrics},
+                "simulated_s": plain["simulated_s"],
+                "engine": plain["engine"],
+                "error": plain["error"],
+                "warnings": json.loads(values["warnings"]),
+                "wall_s": plain["wall_s"],
+            }
+        )
+    return rows
+
+
 def parquet_bytes(table: pd.DataFrame) -> bytes:
     """Returns the contents of a Parquet file with the table."""
     buffer = io.BytesIO()

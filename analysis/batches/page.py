@@ -14,16 +14,18 @@ from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
 from analysis.batches.batch import MOST_CELLS, REPORT, SUMMARY, Batch, Summary
-from analysis.batches.cells import LEAST_RUNS, by_cell, cell_label
+from analysis.batches.cells import LEAST_BINS, by_cell, cell_label
 from analysis.batches.examples import picture_files, write_examples
 from analysis.batches.one_run import FAILED
 from analysis.batches.plan import SweepPlan
 from analysis.batches.plots import (
+    COLORS,
     grid_axes,
+    is_number,
     plot_cells,
     plot_heat_maps,
-    plot_line,
-    plot_marginal,
+    plot_panels,
+    split_field,
 )
 from analysis.batches.report import (
     counts_text,
@@ -51,8 +53,8 @@ from diagrams.running.stop_rules import SUCCESSFUL
 #: Limits that keep a page readable.
 #: MOST_MAPS: greatest number of heat maps.
 #: MOST_ERRORS: greatest number of commands for runs that raised an error.
-#: MOST_OTHERS: greatest number of commands for each other cause of failure.
-MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
+#: MOST_OTHERS: greatest number of commands for each other cause of failure and cell.
+MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 3
 
 
 def write_batch(batch: Batch, document: dict[str, Any]) -> None:
@@ -236,12 +238,17 @@ def _maps(plan: SweepPlan, results: pd.DataFrame, prefix: str) -> list[Content]:
             caption = f"Every metric for each `{axes[0]}`."
             return [_figure(plot_cells(plan, results), f"{prefix}cells", caption)]
         caption = f"Every metric over `{axes[0]}`."
-        return [_figure(plot_line(plan, results, axes[0]), f"{prefix}line", caption)]
+        return [_figure(plot_panels(plan, results, axes[0]), f"{prefix}line", caption)]
     (x, y), others = _map_axes(plan)
     cases = [
         dict(zip(others, values, strict=True))
         for values in product(*(plan.grid[path] for path in others))
     ]
+    for over, by in ((x, y), (y, x)):
+        if is_number(plan, over) and len(plan.grid[by]) <= len(COLORS) and not others:
+            figure = plot_panels(plan, results, over, by)
+            caption = f"Every metric over `{over}`, with one curve per `{by}`."
+            return [_figure(figure, f"{prefix}curves", caption)]
     maps: list[Content] = [
         _figure(
             plot_heat_maps(plan, results, x, y, rest),
@@ -267,14 +274,16 @@ def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
 def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
     return [
         _figure(
-            plot_marginal(plan, results, key),
+            plot_panels(
+                plan, results, key.partition(",")[0].strip(), split_field(plan)
+            ),
             f"marginal{k}",
             f"Every metric over `{key}`, in bins with equal numbers of runs.",
         )
         for k, (key, drawn) in enumerate(plan.draw.items())
         # Lists of boxes are not numbers, and no list is drawn twice. Therefore the runs
-        # cannot be sorted by them. A single bin would show no dependence.
-        if drawn.boxes is None and len(results) >= 2 * LEAST_RUNS
+        # cannot be sorted by them. Bins of a single run would show no dependence.
+        if drawn.boxes is None and len(results) >= 2 * LEAST_BINS
     ]
 
 
@@ -309,24 +318,43 @@ def _examples(
 
 
 def _commands(batch: Batch, summary: Summary) -> list[Content]:
-    """Returns commands that repeat the first failed runs of each cause."""
+    """Returns commands that repeat failed runs of each cause and cell.
+
+    A failure is of more interest the fewer failures its cell has. In a cell, failures
+    by the robot's own fault come first.
+    """
     parts: list[Content] = ["Each command repeats one run and makes its replay."]
-    rows = summary.rows
-    causes = [c for c in rows["cause"].value_counts().index if c not in SUCCESSFUL]
+    cells = [
+        (cell.label, runs)
+        for cell, runs in zip(
+            summary.cells, by_cell(summary.plan, summary.rows), strict=True
+        )
+    ]
+    found = summary.rows["cause"].value_counts().index
+    causes = [cause for cause in found if cause not in SUCCESSFUL]
     for cause in sorted(causes, key=lambda cause: cause != FAILED):
-        runs = rows[rows["cause"] == cause]
-        caption = f"{cause}: {len(runs)} runs"
+        failures = [(label, runs[runs["cause"] == cause]) for label, runs in cells]
+        failures = [(label, runs) for label, runs in failures if len(runs)]
         most = MOST_ERRORS if cause == FAILED else MOST_OTHERS
-        if len(runs) > most:
-            caption += f", of which the first {most}"
-        lines = [
-            (
-                f"Run {row['index']}",
-                f"{_remark(row)}`{run_command(batch, summary.name, row)}`",
+        for label, runs in sorted(failures, key=lambda each: len(each[1])):
+            caption = (
+                f"{cause}, {label}: {len(runs)} runs"
+                if label
+                else (f"{cause}: {len(runs)} runs")
             )
-            for row in runs.head(most).to_dict("records")
-        ]
-        parts += [heading(caption), Definitions(lines)]
+            if len(runs) > most:
+                caption += f", of which {most}"
+            chosen = runs.sort_values(
+                "collision_fault", key=lambda fault: fault != "robot", kind="stable"
+            )
+            lines = [
+                (
+                    f"Run {row['index']}",
+                    f"{_remark(row)}`{run_command(batch, summary.name, row)}`",
+                )
+                for row in chosen.head(most).to_dict("records")
+            ]
+            parts += [heading(caption), Definitions(lines)]
     return parts if causes else []
 
 

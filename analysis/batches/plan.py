@@ -235,9 +235,12 @@ class SweepPlan(Parameters):
 
     @property
     def digest(self) -> str:
-        """Hash of everything that influences the draws and the runs."""
+        """Hash of everything that influences the draws and the runs.
+
+        The number of runs influences neither.
+        """
         base = scenario_from_mapping(self.base).model_dump(mode="json")
-        document = {**self.model_dump(mode="json"), "base": base}
+        document = {**self.model_dump(mode="json", exclude={"runs"}), "base": base}
         if self.file_digests:
             document["files"] = self.file_digests
         return hashlib.sha256(json.dumps(document).encode()).hexdigest()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
+from matplotlib.transforms import ScaledTranslation
 
 from analysis.batches.cells import (
     Quantity,
@@ -20,9 +21,12 @@ from analysis.batches.cells import (
     quantities,
     short,
 )
+from analysis.batches.field_words import field_label
 from analysis.batches.plan import SweepPlan
 from analysis.report.intervals import Estimate
 from analysis.report.palette import draw_grid, luminance
+from diagrams.scenario.suggestions import did_you_mean
+from systems.framework.input_error import InputError
 
 WIDTH_IN = 9.0
 #: MOST_NUMBERS: greatest number of columns of a heat map with numbers in its fields.
@@ -136,7 +140,7 @@ def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
         rotation=30 if turned else 0,
         ha="right" if turned or side == "y" else "center",
     )
-    axis.set_label_text(path, fontsize=9)
+    axis.set_label_text(field_label(path), fontsize=9)
 
 
 def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
@@ -159,56 +163,43 @@ def plot_cells(plan: SweepPlan, results: pd.DataFrame) -> Figure:
     return figure
 
 
-def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
-    """Draws each quantity over x, the only field of the grid, with 95 % intervals."""
+def plot_panels(
+    plan: SweepPlan, results: pd.DataFrame, over: str, by: str = ""
+) -> Figure:
+    """Draws one panel per quantity over a field; see ``plot_over``."""
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
-        estimates = [quantity.estimate(runs) for runs in by_cell(plan, results)]
-        places = np.arange(len(estimates), dtype=float)
-        _errorbars(axes, places, estimates, COLORS[0], "")
-        _frame(axes, quantity)
-        _ticks(axes, "x", x, plan.grid[x])
+        _draw_over(axes, plan, results, quantity, over, by)
+        axes.set_title(quantity.label, fontsize=10)
+        axes.xaxis.label.set_fontsize(9)
+        axes.tick_params(labelsize=8)
+    _legend(figure, plan, by)
     return figure
 
 
-def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
-    """Draws each quantity as a function of one drawn field, a key of ``plan.draw``.
+def is_number(plan: SweepPlan, path: str) -> bool:
+    """Returns whether a field of the grid has several values, which are numbers."""
+    kinds = {type(value) for value in plan.grid[path]}
+    return len(plan.grid[path]) > 1 and kinds <= {int, float}
 
-    The curves are those of the first field of the grid that has two to four values: one
-    curve per value. If there is no such field, there is one curve. Each curve combines
-    the runs with all values of the other fields.
+
+def numbers_of(plan: SweepPlan) -> list[str]:
+    """Returns the fields that vary and are numbers: those of the grid, then the draws.
+
+    Of several fields that are drawn together, the result has the first one.
     """
-    runs = results
-    split = next(
-        (path for path in grid_axes(plan) if len(plan.grid[path]) <= len(COLORS)), None
-    )
-    groups = {"all runs": runs}
-    if split is not None:
-        cells = plan.cells()
-        groups = {
-            cell_label({split: value}): runs[
-                [cells[cell][split] == value for cell in runs["cell"]]
-            ]
-            for value in plan.grid[split]
-        }
-    figure, panels = _panels(results, 3.0)
-    for axes, quantity in panels:
-        for (label, group), color in zip(groups.items(), COLORS, strict=False):
-            if group.empty:
-                continue
-            found = marginal(plan, key, group, quantity)
-            _errorbars(axes, found.places, found.estimates, color, label)
-            if found.labels:
-                axes.set_xticks(found.places, found.labels, fontsize=7, rotation=30)
-        axes.set_xlabel(key.partition(",")[0], fontsize=9)
-        _frame(axes, quantity)
-    figure.legend(
-        *figure.axes[0].get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=len(groups),
-        frameon=False,
-    )
-    return figure
+    drawn = [
+        key.partition(",")[0].strip()
+        for key, draw in plan.draw.items()
+        if draw.boxes is None and draw.numeric
+    ]
+    return [path for path in plan.grid if is_number(plan, path)] + drawn
+
+
+def split_field(plan: SweepPlan) -> str:
+    """Returns the first field of the grid with two to four values; empty if none."""
+    few = (path for path in grid_axes(plan) if len(plan.grid[path]) <= len(COLORS))
+    return next(few, "")
 
 
 def _errorbars(
@@ -219,8 +210,15 @@ def _errorbars(
     label: str,
     *,
     across: bool = False,
+    joined: bool = True,
+    shift_pt: float = 0.0,
 ) -> None:
-    """Draws estimates as a curve; if ``across`` is true, as one point per row."""
+    """Draws estimates as a curve; if ``across`` is true, as one point per row.
+
+    Without ``joined``, there is no line between the points, for example because they
+    belong to categories. ``shift_pt`` moves the curve to the right, in points, so that
+    the intervals of several curves stay visible.
+    """
     value, low, high = np.array([(each.value, *each.ends) for each in estimates]).T
     spread = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
     axes.errorbar(
@@ -230,16 +228,122 @@ def _errorbars(
         yerr=None if across else spread,
         color=color,
         label=label,
-        linestyle="none" if across else "-",
+        linestyle="-" if joined and not across else "none",
         marker="o",
         markersize=4,
         capsize=3,
         linewidth=1,
+        transform=axes.transData
+        + ScaledTranslation(shift_pt / 72.0, 0.0, axes.figure.dpi_scale_trans),
     )
 
 
-def _frame(axes: Axes, quantity: Quantity) -> None:
-    axes.set_title(quantity.label, fontsize=10)
+def plot_over(
+    plan: SweepPlan, results: pd.DataFrame, name: str, over: str, by: str = ""
+) -> Figure:
+    """Draws one rate or metric over a field, with 95 % intervals.
+
+    A drawn number is sorted into at least four bins with equal numbers of runs.
+    Categories, such as laws, are points that no line joins.
+
+    Args:
+        plan: Plan of the sweep.
+        results: Table of its runs.
+        name: ``success``, ``collision``, or the column of a metric.
+        over: Field on the horizontal axis: a field of ``plan.grid`` or ``plan.draw``.
+        by: Field of the grid with one curve per value. Empty means a single curve.
+
+    Returns:
+        The figure.
+
+    Raises:
+        InputError: The quantity or a field is not one of the sweep.
+    """
+    quantity = _quantity(results, name)
+    drawn = _drawn(plan)
+    if over not in drawn and over not in plan.grid:
+        raise _not_in("over", over, [*plan.grid, *drawn])
+    if by and by not in plan.grid:
+        raise _not_in("by", by, plan.grid)
+    figure = Figure(figsize=(5.0, 3.6), layout="constrained")
+    axes = figure.add_subplot()
+    _draw_over(axes, plan, results, quantity, over, by)
+    axes.set_ylabel(quantity.label)
+    _legend(figure, plan, by)
+    return figure
+
+
+def _drawn(plan: SweepPlan) -> dict[str, str]:
+    """Returns the key in ``plan.draw`` of each drawn field."""
+    return {path.strip(): key for key in plan.draw for path in key.split(",")}
+
+
+def _draw_over(
+    axes: Axes,
+    plan: SweepPlan,
+    results: pd.DataFrame,
+    quantity: Quantity,
+    over: str,
+    by: str,
+) -> None:
+    cells, drawn = plan.cells(), _drawn(plan)
+    for k, value in enumerate(plan.grid[by] if by else [None]):
+        own = [cells[cell].get(by) == value for cell in results["cell"]]
+        group = results[own] if by else results
+        if group.empty:
+            continue
+        if over in drawn:
+            found = marginal(plan, drawn[over], group, quantity)
+            places, names, estimates = found.places, found.labels, found.estimates
+        else:
+            places, names = _places(plan.grid[over])
+            of_run = [cells[cell][over] for cell in group["cell"]]
+            estimates = tuple(
+                quantity.estimate(group[[at == each for at in of_run]])
+                for each in plan.grid[over]
+            )
+        color, label = COLORS[k % len(COLORS)], short(value) if by else ""
+        shift = 4.0 * (k - 0.5 * (len(plan.grid[by]) - 1)) if by else 0.0
+        _errorbars(
+            axes, places, estimates, color, label, joined=not names, shift_pt=shift
+        )
+        if names:
+            axes.set_xticks(places, names, rotation=30 if len(names) > 4 else 0)
+    axes.set_xlabel(field_label(over, plan.base))
     draw_grid(axes)
     if quantity.rate:
         axes.set_ylim(-0.03, 1.03)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
+
+
+def _legend(figure: Figure, plan: SweepPlan, by: str) -> None:
+    if by:
+        figure.legend(
+            *figure.axes[0].get_legend_handles_labels(),
+            title=field_label(by, plan.base),
+            loc="outside lower center",
+            ncols=4,
+            frameon=False,
+        )
+
+
+def _places(values: Sequence[Any]) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Positions of the values on an axis, and their names if they are no numbers."""
+    if all(isinstance(value, int | float) for value in values):
+        return np.array(values, dtype=float), ()
+    return np.arange(len(values), dtype=float), tuple(short(value) for value in values)
+
+
+def _quantity(results: pd.DataFrame, name: str) -> Quantity:
+    known = [each.name for each in quantities(results)]
+    if name in known or name in results:
+        return Quantity(name)
+    raise _not_in("quantity", name, known)
+
+
+def _not_in(field: str, name: str, known: Iterable[str]) -> InputError:
+    names = list(known)
+    return InputError(
+        field,
+        f"{name!r} is not there; use {', '.join(names)}{did_you_mean(name, names)}",
+    )

@@ -1,7 +1,8 @@
 """The directory of a parameter sweep, which saves each run as soon as the run ends.
 
 While a sweep is running, each finished run adds a line to ``runs.jsonl``. When all runs
-are finished, ``runs.parquet`` replaces this file.
+are finished, ``runs.parquet`` replaces this file. A plan with more runs per cell than
+before adds runs to the directory.
 """
 
 from __future__ import annotations
@@ -19,7 +20,13 @@ import pandas as pd
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from analysis.batches.one_run import Outcome, is_row, parquet_bytes, results_table
+from analysis.batches.one_run import (
+    Outcome,
+    is_row,
+    parquet_bytes,
+    results_table,
+    table_rows,
+)
 from analysis.batches.plan import SweepPlan, SweepPoint, dump_plan
 from analysis.report.provenance import SCHEMA_VERSION, versions
 from analysis.report.result_directory import whole_directory
@@ -55,6 +62,7 @@ class SweepStore:
         try:
             if out is not None and out.is_dir() and any(out.iterdir()):
                 _check_same(out, plan)
+                _check_grows(out, plan)
                 self.out = out
             else:
                 with whole_directory(out) as (self.out, directory):
@@ -67,6 +75,9 @@ class SweepStore:
         except OSError as error:
             raise _unwritable(out, error) from None
         try:
+            text = dump_plan(plan)
+            if (self.out / PLAN).read_text("utf-8") != text:
+                _write_whole(self.out / PLAN, text.encode())
             self._open(points)
         except InputError:
             self.close()
@@ -79,9 +90,13 @@ class SweepStore:
         """Finds the finished runs; removes lines of the file that are not runs."""
         path = self.out / JOURNAL
         if (self.out / TABLE).exists() and not path.exists():
-            _check_table(self.out, points)
-            self.done = set(range(len(points)))
-            return
+            known = _known_runs(self.out, points)
+            if len(known) == len(points):
+                self.done = set(known)
+                return
+            # The sweep grows: the runs of its table are the first lines again.
+            rows = table_rows(load_results(self.out), known)
+            _write_whole(path, b"".join(map(_line, rows)))
         lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
         kept, dropped = _runs_of(points, lines)
         if dropped:
@@ -100,7 +115,7 @@ class SweepStore:
     def add(self, outcome: Outcome) -> None:
         """Writes the results of a run; raises StoreError if this fails."""
         index = outcome.row["index"]
-        line = memoryview((json.dumps(outcome.row, allow_nan=False) + "\n").encode())
+        line = memoryview(_line(outcome.row))
         size = os.fstat(self._journal).st_size
         try:
             if outcome.trajectory is not None:
@@ -261,10 +276,13 @@ def _is_run_of(points: Sequence[SweepPoint], row: dict[str, Any]) -> bool:
     return json.dumps({name: row[name] for name in point}) == json.dumps(point)
 
 
-def _check_table(out: Path, points: Sequence[SweepPoint]) -> None:
-    """Rejects a table whose runs are not exactly the runs of the plan."""
+def _known_runs(out: Path, points: Sequence[SweepPoint]) -> dict[int, SweepPoint]:
+    """Returns the points of a table of finished runs, by number of the run.
+
+    Raises InputError if the runs are not the first runs of the plan.
+    """
     table = load_results(out)
-    own = [(point.index, point.seed) for point in points]
+    own = [(point.index, point.seed) for point in points[: len(table)]]
     if not {"index", "seed"} <= {*table} or own != [
         *zip(table["index"], table["seed"], strict=True)
     ]:
@@ -273,6 +291,22 @@ def _check_table(out: Path, points: Sequence[SweepPoint]) -> None:
             f"{out / TABLE} does not hold the runs of this sweep; remove it to repeat "
             "them, or name another directory",
         )
+    return {point.index: point for point in points[: len(table)]}
+
+
+def _check_grows(out: Path, plan: SweepPlan) -> None:
+    """Rejects a plan with fewer runs than the directory already has."""
+    stored = YAML(typ="safe").load(out / PLAN).get("runs", 1)
+    if stored > plan.runs:
+        raise InputError(
+            "runs",
+            f"is {plan.runs}, but the sweep in {out} has {stored} runs per cell; give "
+            f"{stored} or more, or name another directory",
+        )
+
+
+def _line(row: dict[str, Any]) -> bytes:
+    return (json.dumps(row, allow_nan=False) + "\n").encode()
 
 
 def _parse(line: bytes) -> dict[str, Any] | None:

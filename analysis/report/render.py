@@ -23,6 +23,8 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.font_manager import FontProperties
 from matplotlib.mathtext import math_to_image
 
+from analysis.report.provenance import made_by
+from analysis.report.references import cited_in
 from analysis.report.section import (
     ZERO,
     Bullets,
@@ -77,9 +79,16 @@ def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) 
 
     The argument ``parts`` contains the sections as HTML, and ``contents`` contains the
     anchor and the title of each section. The page loads no other files, apart from its
-    pictures.
+    pictures. At its end, it lists the references that its text cites, and states the
+    date and the version.
     """
-    return f"{_template().page(title, list(contents), list(map(Markup, parts)))}\n"
+    shown = [Markup(part) for part in parts]
+    listed = list(contents)
+    if cited := cited_in("".join(shown)):
+        section = Section("references", "References", [Definitions(cited.items())])
+        shown.append(html(section, section.key))
+        listed.append(("references", "References"))
+    return f"{_template().page(title, listed, shown, made_by())}\n"
 
 
 def text(content: Content) -> str:

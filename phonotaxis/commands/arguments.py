@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 from typing import Any
 
 from phonotaxis.run_files import CSV_FILE, MCAP_FILE
@@ -62,6 +63,24 @@ def take_output(parser: ArgumentParser) -> None:
     )
     completed_by(out, "directory")
     take_json(parser)
+
+
+def take_figures(parser: ArgumentParser) -> None:
+    """Adds the option ``--figures``."""
+    parser.add_argument(
+        "--figures",
+        action="store_true",
+        help="write figures of rates and metrics as PDF, SVG and PNG files, for papers",
+    )
+
+
+def write_batch_files(
+    options: Namespace, result: Any, document: dict[str, Any], directory: Path
+) -> None:
+    """Writes the files of a batch of runs; with ``--figures``, its figures, too."""
+    result.write(document, directory)
+    if options.figures:
+        result.save_figures(directory / "figures")
 
 
 def take_exports(parser: ArgumentParser) -> None:

@@ -9,8 +9,10 @@ from phonotaxis.commands.arguments import (
     SCENARIO_WORDS,
     completed_by,
     say,
+    take_figures,
     take_laws,
     take_output,
+    write_batch_files,
 )
 from phonotaxis.commands.command import Command, Take
 
@@ -61,6 +63,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--resume", action="store_true", help="continue with the runs in --out"
     )
+    take_figures(parser)
     take_output(parser)
 
 
@@ -95,6 +98,7 @@ COMMAND = Command(
     _add_arguments,
     _prepare,
     where="\nresults in {out}, report in {out}/report.html",
+    write=write_batch_files,
     examples=(
         "compare two_static_obstacles --laws conventional,active --runs 20",
         "compare --set hearing=ideal --velocity-term printed,closing",

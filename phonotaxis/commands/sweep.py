@@ -5,7 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import say, take_output
+from phonotaxis.commands.arguments import (
+    say,
+    take_figures,
+    take_output,
+    write_batch_files,
+)
 from phonotaxis.commands.command import Command, Take
 
 if TYPE_CHECKING:
@@ -29,6 +34,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--resume", action="store_true", help="continue with the runs in --out"
     )
+    take_figures(parser)
     take_output(parser)
 
 
@@ -63,6 +69,7 @@ COMMAND = Command(
     _add_arguments,
     _prepare,
     where="\nresults in {out}, report in {out}/report.html",
+    write=write_batch_files,
     examples=(
         "sweep docs/examples/crossing.yaml",
         "sweep docs/examples/crossing.yaml --out results/crossing --resume",

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from collections import Counter
 from html.parser import HTMLParser
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -201,3 +203,21 @@ def test_tables_in_a_terminal_have_columns_of_equal_width():
 )
 def test_every_content_has_a_text(content, words):
     assert text(content) == words
+
+
+def test_a_page_states_its_date_version_commit_and_sources(monkeypatch):
+    """1e9 s after 1970 is 2001-09-09; the commit is that of git."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000000000")
+    shown = page("Title", [("a", "A")], ["<p>As in Han 2019.</p>"])
+    assert "Made on 2001-09-09 by phonotaxis " in shown
+    root = Path(__file__).parents[3]
+    if (root / ".git").exists():
+        words = ["git", "-C", str(root), "rev-parse", "HEAD"]
+        commit = subprocess.check_output(words, text=True)
+        told = re.search(r"commit (\w+)", shown)
+        assert told is not None
+        assert commit.startswith(told[1])
+    assert '<li><a href="#references">References</a></li>' in shown
+    assert "Active Virtual Impedance Control for Sound-Following Robots" in shown
+    assert "Engelbrecht" not in shown
+    assert "References" not in page("Title", [("a", "A")], ["<p>Nothing.</p>"])
