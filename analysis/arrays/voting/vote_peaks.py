@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.voting.direction_votes import DirectionVotes
+from analysis.arrays.voting.steep_votes import SteepVotes, steep_votes, without_steep
 
 _CELLS = 360
 
@@ -68,6 +69,10 @@ class VotedSource(NamedTuple):
     """Median elevation of the votes, rad. None if the array cannot measure it."""
     share: float
     """Share of the total weight of all votes, 0 to 1."""
+    power: float
+    """Sum of the A-weighted power of its votes."""
+    rises: float
+    """Mean of how far its votes stand out from steady sound, 0 to 1."""
     votes: int
     """Number of votes near the peak."""
     confidence: float
@@ -89,30 +94,72 @@ def gather_sources(
     enough = np.count_nonzero(single) >= least_votes
     use = single if enough else votes.steered
     least = least_votes if enough else _LEAST_STEERED
-    azimuth, weight = votes.azimuth[use], votes.weight[use]
-    if azimuth.size < least:
+    used, steered = votes.part(use, slice(0)), votes.part(votes.steered, slice(0))
+    if used.azimuth.size < least:
         return []
-    density, centers = _density(azimuth, weight)
-    if enough and np.count_nonzero(votes.steered) >= _LEAST_STEERED:
-        other, _ = _density(votes.azimuth[votes.steered], votes.weight[votes.steered])
-        density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
+    whole = float(used.weight.sum())
+    agree = enough and steered.azimuth.size >= _LEAST_STEERED
+    if agree:
         least *= _AGREED
     found = []
-    peaks = _peaks(density)
-    if not peaks.size:
-        return []
-    nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centers[peaks]), axis=1)]
-    for peak in peaks:
-        source = _source(
-            azimuth, votes.elevation[use], weight, centers[peak], nearest == peak
-        )
-        if source is not None and source.votes >= least:
-            height = float(density[peak] / density.max())
-            sure = min(1.0, source.votes / (3.0 * least))
-            found.append(source._replace(confidence=math.sqrt(height) * sure))
+    steep = steep_votes(used.azimuth, used.elevation, used.weight)
+    level = without_steep(used.elevation)
+    if steep is not None:
+        found = [_steep_source(used, steep, whole, least)]
+        level = ~steep.dropped
+    used = used.part(level, slice(0))
+    steered = steered.part(without_steep(steered.elevation), slice(0))
+    if used.azimuth.size:
+        found += _level_sources(used, steered if agree else None, whole, least)
+    found = [source for source in found if source.votes >= least]
     most = max((source.share for source in found), default=0.0)
     found = [source for source in found if source.share >= _LEAST_SHARE * most]
     return sorted(found, key=lambda source: -source.share)
+
+
+def _steep_source(
+    votes: DirectionVotes, steep: SteepVotes, whole: float, least: float
+) -> VotedSource:
+    chosen = steep.chosen
+    count = int(np.count_nonzero(chosen))
+    std = steep.bearing_spread / math.sqrt(min(float(max(count, 1)), _INDEPENDENT))
+    share = float(votes.weight[chosen].sum()) / whole
+    sure = min(1.0, count / (3.0 * least))
+    return VotedSource(
+        bearing=steep.bearing,
+        bearing_std=math.hypot(
+            std, _LEAST_STD_RAD / max(math.cos(steep.elevation), 0.01)
+        ),
+        elevation=steep.elevation,
+        share=share,
+        power=float(votes.power[chosen].sum()),
+        rises=float(votes.rises[chosen].mean()),
+        votes=count,
+        confidence=math.sqrt(min(1.0, 2.0 * share)) * sure,
+    )
+
+
+def _level_sources(
+    votes: DirectionVotes, steered: DirectionVotes | None, whole: float, least: float
+) -> list[VotedSource]:
+    """Finds the sources that are not steep, from votes and from steered votes."""
+    azimuth, weight = votes.azimuth, votes.weight
+    density, centers = _density(azimuth, weight)
+    if steered is not None and steered.azimuth.size:
+        other, _ = _density(steered.azimuth, steered.weight)
+        density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
+    peaks = _peaks(density)
+    if not peaks.size:
+        return []
+    found = []
+    nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centers[peaks]), axis=1)]
+    for peak in peaks:
+        source = _source(votes, centers[peak], nearest == peak, whole)
+        if source is not None:
+            height = float(density[peak] / density.max())
+            sure = min(1.0, source.votes / (3.0 * least))
+            found.append(source._replace(confidence=math.sqrt(height) * sure))
+    return found
 
 
 def _density(
@@ -142,17 +189,17 @@ def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _source(
-    azimuth: NDArray[np.float64],
-    elevation: NDArray[np.float64],
-    weight: NDArray[np.float64],
+    votes: DirectionVotes,
     bearing: float,
     nearest: NDArray[np.bool_],
+    whole: float,
 ) -> VotedSource | None:
     """Makes the source at a peak from the votes that are nearest to this peak.
 
     The source is None if no vote is near the peak, for example if only the steered
     response has a peak there.
     """
+    azimuth, weight = votes.azimuth, votes.weight
     near = np.abs(wrapped(azimuth - bearing)) < _NEAR_RAD
     count = int(np.count_nonzero(near))
     mine = near & nearest
@@ -166,12 +213,14 @@ def _source(
     off = wrapped(a - bearing)
     spread = math.sqrt(float(w @ off**2) / float(w.sum()))
     std = spread / math.sqrt(min(float(a.size), _INDEPENDENT))
-    heights = elevation[mine]
+    heights = votes.elevation[mine]
     return VotedSource(
         bearing=float(wrapped(bearing)),
         bearing_std=math.hypot(std, _LEAST_STD_RAD),
         elevation=float(np.median(heights)) if np.isfinite(heights).all() else None,
-        share=float(w.sum() / weight.sum()),
+        share=float(w.sum()) / whole,
+        power=float(votes.power[mine].sum()),
+        rises=float(votes.rises[mine].mean()),
         votes=count,
         confidence=0.0,
     )

@@ -17,6 +17,12 @@ from analysis.arrays.voting.vote_peaks import VotedSource
 STD = math.radians(2.0)
 
 
+def detected(bearing):
+    return VotedSource(
+        bearing, STD, None, share=1.0, power=1.0, rises=1.0, votes=10, confidence=1.0
+    )
+
+
 def follow(ways, steps, step_s=0.1, seed=0):
     """Tracks over time of sources that are heard apart, or as one within 12 deg."""
     rng, memory, told = np.random.default_rng(seed), TrackMemory(), []
@@ -26,7 +32,7 @@ def follow(ways, steps, step_s=0.1, seed=0):
         if len(at) == 2 and abs(at[0] - at[1]) < 12.0:
             at = [0.5 * (at[0] + at[1])]
         detections = [
-            VotedSource(bearing, STD, None, share=1.0, votes=10, confidence=1.0)
+            detected(bearing)
             for bearing in np.radians([a + 2.0 * rng.standard_normal() for a in at])
         ]
         tracks, memory = step_tracks(detections, t, memory, TrackParameters())

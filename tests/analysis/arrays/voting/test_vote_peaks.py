@@ -19,9 +19,12 @@ def votes_at(single_deg, steered_deg):
         azimuth,
         np.full(count, np.nan),
         np.ones(count),
+        np.ones(count),
+        np.ones(count),
         np.arange(count) >= len(single_deg),
         np.empty(0),
         np.empty((0, 24)),
+        np.empty((0, 2)),
     )
 
 
