@@ -58,10 +58,6 @@ _LEAST_HIGHEST_HZ = 1_000.0
 
 _SPEEDS_M_S = (100.0, 2_000.0)
 
-# Share of the weight that a vote keeps if it does not rise above the steady sound. A
-# fan that sounds all the time has many more votes than a talker who is louder.
-_STEADY_WEIGHT = 0.1
-
 
 class DirectionVotes(NamedTuple):
     """Votes for directions in the order of time, and levels of the sound over time.
@@ -79,8 +75,7 @@ class DirectionVotes(NamedTuple):
     """
     weight: NDArray[np.float64]
     """(k,) weights. The weight of a single bin is its frequency, Hz. The weight of a
-    steered vote is its response, 0 to 1. The weight of sound that does not rise above
-    the steady level of its bin is reduced."""
+    steered vote is its response, 0 to 1."""
     power: NDArray[np.float64]
     """(k,) A-weighted power of the bin of each vote, or of the whole group for a
     steered vote."""
@@ -340,7 +335,7 @@ def _cast(
         t_s,
         azimuth,
         elevation,
-        weight * (_STEADY_WEIGHT + (1.0 - _STEADY_WEIGHT) * rises),
+        weight,
         np.asarray(power, dtype=np.float64),
         np.asarray(rises, dtype=np.float64),
         np.full(len(t_s), steered),

@@ -56,6 +56,12 @@ _LEAST_STD_RAD = math.radians(0.5)
 
 _STEPS = 4
 
+# _MOSTLY_STEADY: mean of how far the votes stand out from steady sound, below which
+#   steady sound such as that of a fan has most of the votes, though a talker may be
+#   louder.
+# _STEADY_WEIGHT: share of the weight that votes for steady sound then keep.
+_MOSTLY_STEADY, _STEADY_WEIGHT = 0.5, 0.1
+
 
 class VotedSource(NamedTuple):
     """A direction from which sound came, with the votes for it."""
@@ -90,6 +96,7 @@ def gather_sources(
     cannot be separated, because no time or frequency contains only one of them. For
     less than one second of sound, ``least_votes`` must be smaller.
     """
+    votes = _weighed(votes)
     single = ~votes.steered
     enough = np.count_nonzero(single) >= least_votes
     use = single if enough else votes.steered
@@ -115,6 +122,15 @@ def gather_sources(
     most = max((source.share for source in found), default=0.0)
     found = [source for source in found if source.share >= _LEAST_SHARE * most]
     return sorted(found, key=lambda source: -source.share)
+
+
+def _weighed(votes: DirectionVotes) -> DirectionVotes:
+    """Reduces the weights of votes for steady sound if most votes are for it."""
+    single = ~votes.steered if not votes.steered.all() else votes.steered
+    if not single.any() or votes.rises[single].mean() >= _MOSTLY_STEADY:
+        return votes
+    kept = _STEADY_WEIGHT + (1.0 - _STEADY_WEIGHT) * votes.rises
+    return votes._replace(weight=votes.weight * kept)
 
 
 def _steep_source(
