@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from analysis.arrays.array_geometry import ArrayGeometry
-    from analysis.arrays.locate_result import SourceEstimate
+    from analysis.arrays.source_estimate import SourceEstimate
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.batches.plan import SweepPlan
     from analysis.run_error import RunError

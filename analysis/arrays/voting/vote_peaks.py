@@ -54,6 +54,9 @@ _LEAST_STEERED = 3
 _INDEPENDENT = 30.0
 _LEAST_STD_RAD = math.radians(0.5)
 
+# Standard deviation of Gaussian values over the median of their magnitudes.
+_MAD_TO_STD = 1.4826
+
 _STEPS = 4
 
 # _MOSTLY_STEADY: mean of how far the votes stand out from steady sound, below which
@@ -73,6 +76,9 @@ class VotedSource(NamedTuple):
     votes count as independent."""
     elevation: float | None
     """Median elevation of the votes, rad. None if the array cannot measure it."""
+    elevation_std: float | None
+    """Scatter of the elevations of the votes, rad. Errors in common do not average out,
+    so it is that of one vote."""
     share: float
     """Share of the total weight of all votes, 0 to 1."""
     power: float
@@ -147,6 +153,7 @@ def _steep_source(
             std, _LEAST_STD_RAD / max(math.cos(steep.elevation), 0.01)
         ),
         elevation=steep.elevation,
+        elevation_std=_scatter(votes.elevation[chosen]),
         share=share,
         power=float(votes.power[chosen].sum()),
         rises=float(votes.rises[chosen].mean()),
@@ -230,16 +237,23 @@ def _source(
     spread = math.sqrt(float(w @ off**2) / float(w.sum()))
     std = spread / math.sqrt(min(float(a.size), _INDEPENDENT))
     heights = votes.elevation[mine]
+    measured = bool(np.isfinite(heights).all())
     return VotedSource(
         bearing=float(wrapped(bearing)),
         bearing_std=math.hypot(std, _LEAST_STD_RAD),
-        elevation=float(np.median(heights)) if np.isfinite(heights).all() else None,
+        elevation=float(np.median(heights)) if measured else None,
+        elevation_std=_scatter(heights) if measured else None,
         share=float(w.sum()) / whole,
         power=float(votes.power[mine].sum()),
         rises=float(votes.rises[mine].mean()),
         votes=count,
         confidence=0.0,
     )
+
+
+def _scatter(angles: NDArray[np.float64]) -> float:
+    off = np.abs(angles - np.median(angles))
+    return max(_LEAST_STD_RAD, _MAD_TO_STD * float(np.median(off)))
 
 
 def wrapped(angle: Any) -> Any:

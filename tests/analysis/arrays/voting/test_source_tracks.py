@@ -19,7 +19,15 @@ STD = math.radians(2.0)
 
 def detected(bearing):
     return VotedSource(
-        bearing, STD, None, share=1.0, power=1.0, rises=1.0, votes=10, confidence=1.0
+        bearing=bearing,
+        bearing_std=STD,
+        elevation=None,
+        elevation_std=None,
+        share=1.0,
+        power=1.0,
+        rises=1.0,
+        votes=10,
+        confidence=1.0,
     )
 
 
