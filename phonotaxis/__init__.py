@@ -82,7 +82,7 @@ _HOMES = {
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
-    "SourceEstimate": "analysis.arrays.locate_result",
+    "SourceEstimate": "analysis.arrays.source_estimate",
     "SourceListener": "analysis.arrays.voting.source_listener_block",
     "StabilityResult": "phonotaxis.loops",
     "SweepPlan": "analysis.batches.plan",

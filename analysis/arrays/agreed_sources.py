@@ -44,6 +44,10 @@ _FAR_APERTURES = 1.5
 # number of estimates for which this matters.
 _LEAST_AGREED, _LEAST_ESTIMATES = 1.0 / 3.0, 4
 
+# Least number of estimates of a source that is no side lobe or echo, and their least
+# number as a share of those of the main source.
+_LEAST_OWN, _LEAST_OF_MAIN = 3, 0.25
+
 # Faults that do not change directions.
 _HARMLESS = ("clipped", "inverted")
 
@@ -122,7 +126,7 @@ def _doubts(
     of_count = []
     if heard.beside_steady:
         of_count.append("one of the sounds is steady")
-    if heard.side_lobes and not all(of_source):
+    if heard.side_lobes and not all(_are_confirmed(of_source)):
         of_count.append("directions may be side lobes of a wide array")
     return _Doubts(of_all, of_count)
 
@@ -157,8 +161,8 @@ def _joined(
         return [], []
     first = _main(heard, of_source)
     sources = [
-        _capped(source) if heard.side_lobes and not chosen else source
-        for source, chosen in zip(heard.sources, of_source, strict=True)
+        source if sure or not heard.side_lobes else _capped(source)
+        for source, sure in zip(heard.sources, _are_confirmed(of_source), strict=True)
     ]
     main = _measured(sources.pop(first), estimates, of_source[first])
     return [main, *sources], of_source[first]
@@ -174,6 +178,13 @@ def _main(heard: HeardSources, of_source: list[list[int]]) -> int:
     counts = np.array([len(chosen) for chosen in of_source])
     alike = heard.side_lobes | (shares >= _AS_LOUD * shares.max())
     return int(np.lexsort((-shares, -counts, ~alike))[0])
+
+
+def _are_confirmed(of_source: list[list[int]]) -> list[bool]:
+    """Returns whether the estimates confirm each source."""
+    most = max((len(chosen) for chosen in of_source), default=0)
+    least = max(min(_LEAST_OWN, most), _LEAST_OF_MAIN * most, 1)
+    return [len(chosen) >= least for chosen in of_source]
 
 
 def _measured(

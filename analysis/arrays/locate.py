@@ -112,11 +112,8 @@ def _with_errors(source: HeardSource, array: KnownArray) -> HeardSource:
     """Adds the errors of the array to the standard deviations of a source of votes."""
     shape, c = array.shape, array.c
     azimuth, height = np.radians([source.bearing_deg, source.elevation_deg or 0.0])
-    level = math.cos(height)
-    u = np.array(
-        [level * math.cos(azimuth), level * math.sin(azimuth), math.sin(height)]
-    )
-    u = u[: shape.p_AM.shape[1]]
+    level = np.array([math.cos(azimuth), math.sin(azimuth)]) * math.cos(height)
+    u = np.append(level, math.sin(height))[: shape.p_AM.shape[1]]
     tau = -(shape.p_AM[1:] - shape.p_AM[0]) @ u / c
     errors = array.budget.delay_covariance(u, 0.0, shape, c)
     fix = locate_far_source(tau, errors, shape, c)

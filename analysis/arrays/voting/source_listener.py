@@ -21,7 +21,7 @@ from analysis.arrays.voting.source_tracks import (
     TrackParameters,
     step_tracks,
 )
-from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_peaks import gather_turning
 from systems.framework.parameters import Parameters, Positive
 
 # _VOTES_S: least number of bins that vote for a source, per second of the window.
@@ -152,7 +152,9 @@ def _tracked(
     least = max(_LEAST_VOTES, _VOTES_S * parameters.window_s)
     detections = [
         source._replace(bearing_std=_OVERLAP * source.bearing_std)
-        for source in gather_sources(votes, least_votes=least)
+        for source in gather_turning(
+            votes, t_s - 0.5 * parameters.window_s, least_votes=least
+        )
     ]
     told, memory = step_tracks(detections, t_s, memory, parameters.tracks)
     return TrackedSources(t_s, tuple(told)), memory

@@ -36,9 +36,26 @@ _GATE = 3.5
 # _GOES: rate at which a source disappears, 1/s.
 _FALLS_SILENT, _SPEAKS_AGAIN, _GOES = 1.0, 2.0, 0.2
 
+# Largest difference of elevations of one source, rad. In rooms they are too high.
+_ELEVATION_ERROR = math.radians(40.0)
+# Largest angle between a detection and its track, rad.
+_FARTHEST = math.radians(45.0)
+
+# Standard deviation of the bias of a detection by other sources and reflections, rad.
+# It widens the gate of a track, but many detections do not average it out.
+_BIAS_STD = math.radians(3.0)
+
+# Time constant with which the rate of a track that is not heard decays, s. Most sources
+# that pause are at rest, and a rate from noise must not carry the track away. Rates
+# above _TURNING, rad/s, are not from noise.
+_RATE_FADES_S, _TURNING = 0.4, math.radians(25.0)
+
+# Standard deviation of the measured rate of a source that turns fast, rad/s.
+_TURN_STD = 0.3
+
 # _BORN: probability that the first detection of a track is from a source.
 # _RATE_STD: standard deviation of the bearing rate of a new track, rad/s.
-_BORN, _RATE_STD = 0.05, 0.4
+_BORN, _RATE_STD = 0.05, 0.8
 
 
 class TrackParameters(Parameters):
@@ -71,6 +88,11 @@ class TrackParameters(Parameters):
     hidden_s: Positive = 3.0
     """Time without a detection of its own after which a track ends, s. It limits how
     long a nearby track may hide a track."""
+    remembered_s: Positive = 10.0
+    """Time for which the identity of a track that is not heard is remembered, s. A
+    source that sounds again near its last bearing gets its identity back."""
+    returns_within_deg: float = Field(default=15.0, gt=0.0, le=90.0)
+    """Largest distance of such a source from its last bearing, deg."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +142,8 @@ class TrackMemory:
     """All tracks, including those that are not reported yet."""
 
     tracks: tuple[SourceTrack, ...] = ()
+    ended: tuple[SourceTrack, ...] = ()
+    """Tracks that have ended, but whose identities are remembered."""
     t_s: float | None = None
     """Time of the last step, s. None before the first step."""
     next_identity: int = 1
@@ -139,7 +163,7 @@ def step_tracks(
     elapsed = 0.0 if memory.t_s is None else t_s - memory.t_s
     if elapsed < 0.0:
         raise ValueError(f"t_s: {t_s:g} s is before the last step, {memory.t_s:g} s")
-    tracks = [_predicted(track, elapsed, parameters) for track in memory.tracks]
+    tracks = [_predicted(track, t_s, elapsed, parameters) for track in memory.tracks]
     chosen = _assigned(tracks, detections, parameters)
     hidden = _hidden(tracks, detections, chosen, parameters)
     moved = [
@@ -158,20 +182,63 @@ def step_tracks(
         for k, detection in enumerate(detections)
         if k not in taken and detection.share >= parameters.least_share
     ]
-    alive = _single([t for t in moved if not _over(t, t_s, parameters)], parameters)
-    identity, kept = memory.next_identity, []
+    over = [t for t in moved if _over(t, t_s, parameters)]
+    alive = _single([t for t in moved if t not in over], parameters)
+    ended = [
+        track
+        for track in (*memory.ended, *over)
+        if track.identity and t_s - track.t_heard <= parameters.remembered_s
+    ]
+    identity, kept = memory.next_identity, [*alive, *new]
     for track in alive + new:
-        if track.identity == 0 and _is_told(track, t_s, parameters):
+        if track.identity or not _is_told(track, t_s, parameters):
+            continue
+        kept.remove(track)
+        old = _returned(track, [t for t in kept if t.identity] + ended, parameters)
+        if old is None:
             kept.append(replace(track, identity=identity))
             identity += 1
         else:
-            kept.append(track)
+            kept = [t for t in kept if t is not old]
+            ended = [t for t in ended if t is not old]
+            kept.append(replace(track, identity=old.identity))
     told = sorted((t for t in kept if t.identity > 0), key=lambda t: t.identity)
-    return told, TrackMemory(tuple(kept), t_s, identity)
+    return told, TrackMemory(tuple(kept), tuple(ended), t_s, identity)
 
 
-def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack:
-    forget = math.exp(-dt / p.rate_memory_s)
+def _returned(
+    track: SourceTrack, others: Sequence[SourceTrack], p: TrackParameters
+) -> SourceTrack | None:
+    """Returns the nearest track that was last heard before a new track began."""
+    near = [
+        other
+        for other in others
+        if max(other.t_heard, other.t_shared) < track.t_born
+        and _apart(track, other) < math.radians(p.returns_within_deg)
+    ]
+    return min(near, key=lambda other: _apart(track, other), default=None)
+
+
+def _apart(first: SourceTrack | VotedSource, second: SourceTrack) -> float:
+    """Returns the angle between two directions, rad.
+
+    It is less than that between their bearings if both are steep.
+    """
+    off = abs(wrapped(first.bearing - second.bearing))
+    if first.elevation is None or second.elevation is None:
+        return float(off)
+    steep = min(abs(first.elevation), abs(second.elevation))
+    across = float(off) * math.cos(steep)
+    return max(across, abs(first.elevation - second.elevation) - _ELEVATION_ERROR)
+
+
+def _predicted(
+    track: SourceTrack, t_s: float, dt: float, p: TrackParameters
+) -> SourceTrack:
+    # The track was not heard in the last step if its last detection is older.
+    pauses = max(track.t_heard, track.t_shared) < t_s - dt - 1e-6
+    fades = pauses and abs(track.rate) < _TURNING
+    forget = math.exp(-dt / (_RATE_FADES_S if fades else p.rate_memory_s))
     F = np.array([[1.0, dt], [0.0, forget]])
     q = math.radians(p.acceleration_std_deg_s2) ** 2
     Q = q * np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
@@ -208,7 +275,8 @@ def _assigned(
             # detections.
             late = 0.0 if track.identity else 4.0
             cost[i, k] = off**2 / variance + math.log(variance) + late
-            if off**2 > _GATE**2 * variance:
+            wide = variance + _BIAS_STD**2
+            if off**2 > _GATE**2 * wide or _apart(d, track) > _FARTHEST:
                 cost[i, k] = np.inf
     finite = np.where(np.isfinite(cost), cost, 1e6)
     for i, k in zip(*linear_sum_assignment(finite), strict=True):
@@ -233,8 +301,8 @@ def _hidden(
             k = chosen[j]
             if k is None or not other.identity:
                 continue
-            apart = abs(wrapped(track.bearing - other.bearing))
-            off = abs(wrapped(detections[k].bearing - track.bearing))
+            apart = _apart(track, other)
+            off = _apart(detections[k], track)
             if apart < resolution and off < resolution:
                 hidden[i] = j
                 break
@@ -251,7 +319,14 @@ def _heard(
     track: SourceTrack, detection: VotedSource, t_s: float, p: TrackParameters
 ) -> SourceTrack:
     of_detection = _scatter(track, detection, p)
-    C = track.covariance
+    C, rate = track.covariance, track.rate
+    if detection.rate:
+        # The rate of a source that turns fast is measured as well.
+        share = C[:, 1] / (float(C[1, 1]) + _TURN_STD**2)
+        turned = share * (detection.rate - rate)
+        track = replace(track, bearing=track.bearing + float(turned[0]))
+        rate += float(turned[1])
+        C = C - np.outer(share, C[1])
     variance = float(C[0, 0]) + of_detection
     off = wrapped(detection.bearing - track.bearing)
     gain = C[:, 0] / variance
@@ -269,7 +344,7 @@ def _heard(
     return replace(
         track,
         bearing=wrapped(track.bearing + float(gain[0]) * off),
-        rate=track.rate + float(gain[1]) * off,
+        rate=rate + float(gain[1]) * off,
         covariance=A @ C @ A.T + of_detection * np.outer(gain, gain),
         elevation=track.elevation if elevation is None else elevation,
         sounding=sounding / whole,
@@ -287,11 +362,12 @@ def _missed(track: SourceTrack, p: TrackParameters) -> SourceTrack:
 
 
 def _born(detection: VotedSource, t_s: float) -> SourceTrack:
+    rate_std = _TURN_STD if detection.rate else _RATE_STD
     return SourceTrack(
         identity=0,
         bearing=wrapped(detection.bearing),
-        rate=0.0,
-        covariance=np.diag([detection.bearing_std**2, _RATE_STD**2]),
+        rate=detection.rate,
+        covariance=np.diag([detection.bearing_std**2, rate_std**2]),
         elevation=detection.elevation,
         sounding=_BORN,
         silent=0.0,
@@ -328,7 +404,7 @@ def _single(tracks: list[SourceTrack], p: TrackParameters) -> list[SourceTrack]:
     near = math.radians(0.5 * p.resolution_deg)
     for track in sorted(tracks, key=lambda t: (t.identity == 0, t.t_born)):
         again = track.identity == 0 and any(
-            abs(wrapped(track.bearing - other.bearing)) < near for other in kept
+            _apart(track, other) < near for other in kept
         )
         if not again:
             kept.append(track)

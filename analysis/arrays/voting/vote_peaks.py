@@ -54,6 +54,12 @@ _LEAST_STEERED = 3
 _INDEPENDENT = 30.0
 _LEAST_STD_RAD = math.radians(0.5)
 
+# _RATES: rates of bearings to try, rad/s. Neighbors turn the votes of half a second by
+#   less than the width of the kernel.
+# _TURNS: least height of the highest peak at a rate, as a multiple of that at rest.
+_RATES = np.radians(np.linspace(-120.0, 120.0, 17))
+_TURNS = 1.5
+
 # Standard deviation of Gaussian values over the median of their magnitudes.
 _MAD_TO_STD = 1.4826
 
@@ -90,6 +96,8 @@ class VotedSource(NamedTuple):
     confidence: float
     """Confidence that the source exists, 0 to 1. It is 1 if the peak is the highest and
     has at least three times the required number of votes."""
+    rate: float = 0.0
+    """Rate of the bearing, rad/s. It is 0 unless the source turns fast."""
 
 
 def gather_sources(
@@ -128,6 +136,33 @@ def gather_sources(
     most = max((source.share for source in found), default=0.0)
     found = [source for source in found if source.share >= _LEAST_SHARE * most]
     return sorted(found, key=lambda source: -source.share)
+
+
+def gather_turning(
+    votes: DirectionVotes, t_s: float, *, least_votes: float
+) -> list[VotedSource]:
+    """Finds the sources in a short span of time with the middle t_s, at this middle.
+
+    While a source turns fast, its votes spread over many directions, and only parts of
+    them form peaks. If the votes agree far better when they are turned back by a common
+    rate, this is the rate of the sources.
+    """
+    single = ~votes.steered
+    use = single if np.count_nonzero(single) >= least_votes else votes.steered
+    if not use.any():
+        return []
+    after, weight = votes.t_s[use] - t_s, votes.weight[use]
+    heights = [
+        _density(wrapped(votes.azimuth[use] - rate * after), weight)[0].max()
+        for rate in _RATES
+    ]
+    best = int(np.argmax(heights))
+    rate = float(_RATES[best])
+    if heights[best] < _TURNS * heights[_RATES.size // 2]:
+        rate = 0.0
+    turned = votes._replace(azimuth=wrapped(votes.azimuth - rate * (votes.t_s - t_s)))
+    found = gather_sources(turned, least_votes=least_votes)
+    return [source._replace(rate=rate) for source in found]
 
 
 def _weighed(votes: DirectionVotes) -> DirectionVotes:
