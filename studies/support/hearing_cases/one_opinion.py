@@ -5,12 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 import phonotaxis
+from analysis.arrays.voting.direction_votes import VotePlan
+from analysis.arrays.voting.source_listener import (
+    ListenerMemory,
+    ListenerParameters,
+    hear_sources,
+)
 from studies.support.hearing_cases.case import CLAIM, HearingCase, Outcome
 from studies.support.synthetic_speech import speech_like
 from studies.support.talker_trials import (
@@ -140,17 +146,38 @@ def off_deg(first: float, second: float) -> float:
     return abs((first - second + 180.0) % 360.0 - 180.0)
 
 
-def answer(
+def _geometry(places: Array, side: str | None) -> phonotaxis.ArrayGeometry:
+    return phonotaxis.ArrayGeometry.model_validate(
+        {"microphones": places.tolist(), "sound_speed": 343.0, "side": side}
+    )
+
+
+def locate_answer(
     samples: Array, places: Array, rate: int, side: str | None = None
 ) -> dict[str, Any] | str:
     """Returns the document of ``locate``, or the message of its refusal."""
-    geometry = phonotaxis.ArrayGeometry.model_validate(
-        {"microphones": places.tolist(), "sound_speed": 343.0, "side": side}
-    )
+    geometry = _geometry(places, side)
     try:
         return phonotaxis.locate(samples, geometry, sample_rate_hz=rate).document()
     except InputError as error:
         return str(error)
+
+
+def tracks_of(
+    samples: Array, places: Array, rate: int, side: str | None = None
+) -> dict[int, list[float]]:
+    """Returns the bearings that ``listen`` reports of each identity, deg."""
+    known = _geometry(places, side).known
+    plan = VotePlan.of(known.shape, known.c, rate, band_hz=(200.0, 0.45 * rate))
+    steps, _ = hear_sources(
+        samples, ListenerMemory.blank(plan), plan, ListenerParameters()
+    )
+    tracks: dict[int, list[float]] = {}
+    for step in steps:
+        for track in step.tracks:
+            at = math.degrees(track.bearing)
+            tracks.setdefault(track.identity, []).append(at)
+    return tracks
 
 
 def brief(document: dict[str, Any] | str) -> str:
@@ -219,7 +246,7 @@ def judged(
         silent: Whether no estimate, or a refusal, is right as well.
         side: Side of the array on which the sources are.
     """
-    document = answer(*make(), rate, side)
+    document = locate_answer(*make(), rate, side)
     if isinstance(document, str):
         return Outcome(silent or not truth, brief(document))
     summary = document["summary"]
@@ -239,6 +266,17 @@ def judged(
     return Outcome(bool(right), brief(document), claim)
 
 
+class Wrong(NamedTuple):
+    """What is wrong with a recording or its geometry."""
+
+    order: tuple[int, ...] = ()
+    """Order of the channels. Empty if it is right."""
+    late_s: float = 0.0
+    """How late the second half of the channels is, s."""
+    scale: float = 1.0
+    """Factor of all stated positions."""
+
+
 def _speech_in(
     places: Array,
     at: Degrees,
@@ -246,26 +284,21 @@ def _speech_in(
     t60_s: float,
     snr_db: float,
     seed: int,
-    order: tuple[int, ...] | None = None,
-    late_s: float = 0.0,
-    scale: float = 1.0,
-    rate: int = RATE,
+    wrong: Wrong = Wrong(),
 ) -> tuple[Array, Array]:
     """Makes a recording of one talker, with channels in a wrong order or late."""
     heard = record(
         places,
-        [(speech(seed, rate=rate), at, distance_m)],
+        [(speech(seed), at, distance_m)],
         t60_s=t60_s,
         snr_db=snr_db,
-        rate=rate,
         seed=seed,
     )
-    if late_s:
-        half = len(heard) // 2
-        heard[half:] = np.roll(heard[half:], round(late_s * rate), axis=1)
-    if order is not None:
-        heard = heard[list(order)]
-    return heard, places * scale
+    half = len(heard) // 2
+    heard[half:] = np.roll(heard[half:], round(wrong.late_s * RATE), axis=1)
+    if wrong.order:
+        heard = heard[list(wrong.order)]
+    return heard, places * wrong.scale
 
 
 def _sound_at(
@@ -365,13 +398,13 @@ def _faulty() -> list[HearingCase]:
     ):
         for k, t60 in enumerate((0.0, 0.3)):
             make = partial(
-                _speech_in, places, (70.0, 10.0), 1.5, t60, 25.0, 30 + k, order
+                _speech_in, places, (70.0, 10.0), 1.5, t60, 25.0, 30 + k, Wrong(order)
             )
             found.append(_case(f"{name}, T60 {t60} s", make, truth=[]))
     for late_s in (1.0 / RATE, 0.001, 0.01, 0.05, 0.2):
         for name, places in (("square", SQUARE), ("circle of 6", six)):
             make = partial(
-                _speech_in, places, (50.0, 10.0), 1.5, 0.3, 25.0, 40, None, late_s
+                _speech_in, places, (50.0, 10.0), 1.5, 0.3, 25.0, 40, Wrong((), late_s)
             )
             found.append(
                 _case(f"{name}, half of it {1e3 * late_s:.3g} ms late", make, truth=[])
@@ -382,7 +415,7 @@ def _faulty() -> list[HearingCase]:
         ("feet", 1.0 / 0.3048),
     ):
         make = partial(
-            _speech_in, SQUARE, (50.0, 30.0), 1.5, 0.3, 25.0, 50, None, 0.0, scale
+            _speech_in, SQUARE, (50.0, 30.0), 1.5, 0.3, 25.0, 50, Wrong((), 0.0, scale)
         )
         found.append(
             _case(f"square in {name}", make, truth=[(50.0, 30.0)], silent=True)
