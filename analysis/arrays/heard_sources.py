@@ -22,9 +22,17 @@ from analysis.arrays.voting.direction_votes import (
     cast_votes,
     join_votes,
 )
-from analysis.arrays.voting.source_listener import ListenerParameters, follow_sources
+from analysis.arrays.voting.source_listener import (
+    ListenerParameters,
+    are_unfit,
+    follow_sources,
+)
 from analysis.arrays.voting.source_tracks import SourceTrack
-from analysis.arrays.voting.vote_peaks import VotedSource, gather_sources
+from analysis.arrays.voting.vote_peaks import (
+    VotedSource,
+    gather_sources,
+    wrapped,
+)
 from systems.sound.array_shape import ArrayShape
 
 # Samples per channel in each block of votes.
@@ -52,13 +60,6 @@ _STEADY_DB = 4.4
 # Largest mean of how far the votes of a steady source stand out from the steady level.
 # It is about 0.01 for a fan beside a talker, and 0.8 for the talker.
 _STEADY_RISES = 0.25
-
-# Least share of the bins with one wave whose phases must be those of a plane wave. In
-# rooms and at an SNR of 0 dB it is 0.65 or more. If channels are late or in a wrong
-# order, or if the positions are not in m, it is below 0.5.
-_LEAST_FITTING = 0.55
-# Least number of bins for which this share is known.
-_LEAST_BINS = 30
 
 # A group of frames counts as sounding if its level is within _SOUNDS_DB of the quantile
 # _LOUD_SHARE of all levels. The sound must last at least _LEAST_S, s.
@@ -163,6 +164,12 @@ def heard_sources(
     if steady:
         votes = steered_only(votes)
     found = gather_sources(votes)
+    # A fan may have most votes, but little weight beside a talker.
+    found += [
+        voted
+        for voted in gather_sources(votes, by_level=False)
+        if _is_fan(voted, votes) and not _is_known(voted, found)
+    ]
     power = sum(voted.power for voted in found)
     found.sort(key=lambda voted: -voted.power)
     told = [
@@ -187,8 +194,12 @@ def heard_sources(
 
 def is_unfit(votes: DirectionVotes) -> bool:
     """Returns whether the phases are not those of sound from far away at the array."""
-    waves, fitting = votes.group_fits.sum(axis=0)
-    return bool(waves >= _LEAST_BINS and fitting < _LEAST_FITTING * waves)
+    return are_unfit(votes.group_fits.sum(axis=0))
+
+
+def _is_known(voted: VotedSource, found: list[VotedSource]) -> bool:
+    near = math.radians(2.0 * _NEAR_DEG)
+    return any(abs(wrapped(voted.bearing - one.bearing)) < near for one in found)
 
 
 def _is_fan(voted: VotedSource, votes: DirectionVotes) -> bool:

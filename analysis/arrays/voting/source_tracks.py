@@ -327,8 +327,10 @@ def _heard(
         track = replace(track, bearing=track.bearing + float(turned[0]))
         rate += float(turned[1])
         C = C - np.outer(share, C[1])
-    variance = float(C[0, 0]) + of_detection
     off = wrapped(detection.bearing - track.bearing)
+    if off**2 > _GATE**2 * (float(C[0, 0]) + of_detection):
+        of_detection += _BIAS_STD**2
+    variance = float(C[0, 0]) + of_detection
     gain = C[:, 0] / variance
     # Joseph's form of the covariance update keeps the covariance symmetric.
     A = np.eye(2) - np.outer(gain, [1.0, 0.0])
