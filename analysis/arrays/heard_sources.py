@@ -16,23 +16,19 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.voting.direction_votes import (
-    DirectionVotes,
-    VotePlan,
-    cast_votes,
-    join_votes,
-)
+from analysis.arrays.voting.direction_votes import VotePlan, cast_votes
 from analysis.arrays.voting.source_listener import (
     ListenerParameters,
     are_unfit,
     follow_sources,
 )
-from analysis.arrays.voting.source_tracks import SourceTrack
+from analysis.arrays.voting.track_state import SourceTrack
 from analysis.arrays.voting.vote_peaks import (
     VotedSource,
     gather_sources,
     wrapped,
 )
+from analysis.arrays.voting.vote_records import DirectionVotes, join_votes
 from systems.sound.array_shape import ArrayShape
 
 # Samples per channel in each block of votes.

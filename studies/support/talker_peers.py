@@ -15,8 +15,8 @@ import pyroomacoustics as pra
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from analysis.arrays.voting.direction_votes import DirectionVotes
 from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_records import DirectionVotes
 from studies.support.talker_rooms import RATE, Recording
 
 C = 343.0

@@ -37,6 +37,12 @@ from analysis.arrays.voting.single_waves import (
     group_powers,
 )
 from analysis.arrays.voting.steered_votes import SteeredSearch
+from analysis.arrays.voting.vote_records import (
+    DirectionVotes,
+    cast_of,
+    join_votes,
+    no_votes,
+)
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 
@@ -57,46 +63,6 @@ _HIGHEST_HZ = 8_000.0
 _LEAST_HIGHEST_HZ = 1_000.0
 
 _SPEEDS_M_S = (100.0, 2_000.0)
-
-
-class DirectionVotes(NamedTuple):
-    """Votes for directions in the order of time, and levels of the sound over time.
-
-    A vote is an estimated direction of the sound in a group of consecutive frames.
-    """
-
-    t_s: NDArray[np.float64]
-    """(k,) middles of the groups of the votes, s from the first sample."""
-    azimuth: NDArray[np.float64]
-    """(k,) azimuths from +x towards +y, in (-pi, pi], rad. They are on the side of
-    ``shape.ahead``."""
-    elevation: NDArray[np.float64]
-    """(k,) elevations above the x-y plane, rad. NaN if the array cannot measure them.
-    """
-    weight: NDArray[np.float64]
-    """(k,) weights. The weight of a single bin is its frequency, Hz. The weight of a
-    steered vote is its response, 0 to 1."""
-    power: NDArray[np.float64]
-    """(k,) A-weighted power of the bin of each vote, or of the whole group for a
-    steered vote."""
-    rises: NDArray[np.float64]
-    """(k,) how far the sound stands out from the steady level of its bin, 0 to 1."""
-    steered: NDArray[np.bool_]
-    """(k,) True for a vote of the steered response, False for a vote of a single bin.
-    """
-    group_t_s: NDArray[np.float64]
-    """(g,) middles of all groups of frames, s from the first sample."""
-    group_levels_db: NDArray[np.float64]
-    """(g, 24) power of all channels at 24 frequencies of the band, dB relative to the
-    unit of the samples."""
-    group_fits: NDArray[np.float64]
-    """(g, 2) number of bins with one wave in each group, and number of those in which
-    the phases are clearly those of a plane wave at the speed of sound."""
-
-    def part(self, votes: Any, groups: slice) -> DirectionVotes:
-        """Returns the votes with some indices, and the levels of some groups."""
-        kept = [each[votes] for each in self[:7]] + [each[groups] for each in self[7:]]
-        return DirectionVotes._make(kept)
 
 
 class VoteMemory(NamedTuple):
@@ -210,7 +176,7 @@ def cast_votes(
     samples = np.concatenate((memory.tail, _checked(plan, block)), axis=1)
     groups = (samples.shape[1] - plan.group_samples) // plan.hop + 1
     if groups < 1:
-        return _no_votes(), memory._replace(tail=samples)
+        return no_votes(), memory._replace(tail=samples)
     size = len(plan.window)
     frames = np.lib.stride_tricks.sliding_window_view(samples, size, axis=1)
     frames = frames[:, : (groups + GROUP_FRAMES - 1) * plan.hop : plan.hop]
@@ -266,17 +232,6 @@ class _Groups(NamedTuple):
     """(g,) or (g, b) how far the sound stands out, 0 to 1."""
 
 
-def join_votes(parts: list[DirectionVotes]) -> DirectionVotes:
-    """Joins the votes for directions from several blocks in the order of time."""
-    if not parts:
-        return _no_votes()
-    joined = DirectionVotes._make(
-        np.concatenate(each) for each in zip(*parts, strict=True)
-    )
-    order = np.argsort(joined.t_s, kind="stable")
-    return joined.part(order, slice(None))
-
-
 def _check(c: float, sample_rate_hz: float, band_hz: tuple[float, float]) -> None:
     if not _SPEEDS_M_S[0] <= c <= _SPEEDS_M_S[1]:
         raise InputError(
@@ -315,36 +270,6 @@ def _checked(
     return samples
 
 
-def _no_votes() -> DirectionVotes:
-    none = np.empty(0)
-    return _cast(none, none, none, none, none, none, steered=False)
-
-
-def _cast(
-    t_s: NDArray[np.float64],
-    azimuth: NDArray[np.float64],
-    elevation: NDArray[np.float64],
-    weight: NDArray[np.float64],
-    power: NDArray[np.float64],
-    rises: NDArray[np.float64],
-    *,
-    steered: bool,
-) -> DirectionVotes:
-    """Makes votes of one kind, without the times and levels of the groups."""
-    return DirectionVotes(
-        t_s,
-        azimuth,
-        elevation,
-        weight,
-        np.asarray(power, dtype=np.float64),
-        np.asarray(rises, dtype=np.float64),
-        np.full(len(t_s), steered),
-        np.empty(0),
-        levels_db(np.empty((0, 1), np.float32)),
-        np.empty((0, 2)),
-    )
-
-
 def _steered_votes(
     plan: VotePlan,
     spectra: NDArray[np.complex64],
@@ -366,10 +291,10 @@ def _steered_votes(
             found.append(votes)
             voting += [g] * len(votes[0])
     if not found:
-        return _no_votes()
+        return no_votes()
     azimuth, elevation, weight = (np.concatenate(e) for e in zip(*found, strict=True))
     parts = (of.t_s[voting], azimuth, elevation, weight)
-    return _cast(*parts, of.power[voting], of.rises[voting], steered=True)
+    return cast_of(*parts, of.power[voting], of.rises[voting], steered=True)
 
 
 def _bin_votes(
@@ -393,7 +318,7 @@ def _bin_votes(
         axis=1,
     )
     at = group[fits.fits], bins[fits.fits]
-    votes = _cast(
+    votes = cast_of(
         of.t_s[at[0]],
         fits.azimuth,
         fits.elevation,

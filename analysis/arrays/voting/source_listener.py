@@ -9,20 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.voting.direction_votes import (
-    DirectionVotes,
-    VoteMemory,
-    VotePlan,
-    cast_votes,
-    join_votes,
-)
-from analysis.arrays.voting.source_tracks import (
-    SourceTrack,
-    TrackMemory,
-    TrackParameters,
-    step_tracks,
-)
+from analysis.arrays.voting.direction_votes import VoteMemory, VotePlan, cast_votes
+from analysis.arrays.voting.source_tracks import TrackMemory, step_tracks
+from analysis.arrays.voting.track_state import SourceTrack, TrackParameters
 from analysis.arrays.voting.vote_peaks import gather_turning
+from analysis.arrays.voting.vote_records import DirectionVotes, join_votes
 from systems.framework.parameters import Parameters, Positive
 
 # _VOTES_S: least number of bins that vote for a source, per second of the window.

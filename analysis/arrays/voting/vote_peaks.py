@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.voting.direction_votes import DirectionVotes
 from analysis.arrays.voting.steep_votes import SteepVotes, steep_votes, without_steep
+from analysis.arrays.voting.vote_records import DirectionVotes
 
 _CELLS = 360
 

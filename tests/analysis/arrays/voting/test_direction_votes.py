@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from analysis.arrays.voting.direction_votes import VotePlan, cast_votes, join_votes
+from analysis.arrays.voting.direction_votes import VotePlan, cast_votes
 from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_records import join_votes
 from studies.support.synthetic_speech import speech_like
 from systems.sound.array_shape import ArrayShape
 

@@ -7,11 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.arrays.voting.source_tracks import (
-    TrackMemory,
-    TrackParameters,
-    step_tracks,
-)
+from analysis.arrays.voting.source_tracks import TrackMemory, step_tracks
+from analysis.arrays.voting.track_state import TrackParameters
 from analysis.arrays.voting.vote_peaks import VotedSource
 
 STD = math.radians(2.0)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.arrays.voting.direction_votes import DirectionVotes
 from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_records import DirectionVotes
 
 
 def votes_at(single_deg, steered_deg):
