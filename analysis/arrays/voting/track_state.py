@@ -29,8 +29,9 @@ BIAS_STD = math.radians(3.0)
 
 # Time constant with which the rate of a track that is not heard decays, s. Most sources
 # that pause are at rest, and a rate from noise must not carry the track away. Rates
-# above _TURNING, rad/s, are not from noise.
-_RATE_FADES_S, _TURNING = 0.4, math.radians(25.0)
+# above _TURNING, rad/s, are not from noise. After less than _PAUSE_S, s, another source
+# may only mask the track, as when two sources cross.
+_RATE_FADES_S, _TURNING, _PAUSE_S = 0.4, math.radians(25.0), 0.9
 
 # Standard deviation of the measured rate of a source that turns fast, rad/s.
 _TURN_STD = 0.3
@@ -137,9 +138,9 @@ def predicted(
 ) -> SourceTrack:
     """Returns a track after a time dt, s, at the time t_s.
 
-    The track pauses if its last detection is older than the last step.
+    While a track pauses, its rate fades.
     """
-    pauses = max(track.t_heard, track.t_shared) < t_s - dt - 1e-6
+    pauses = t_s - max(track.t_heard, track.t_shared) > _PAUSE_S
     fades = pauses and abs(track.rate) < _TURNING
     forget = math.exp(-dt / (_RATE_FADES_S if fades else p.rate_memory_s))
     F = np.array([[1.0, dt], [0.0, forget]])

@@ -67,3 +67,31 @@ def test_time_must_run_forward():
     _, memory = step_tracks([], 1.0, TrackMemory(), TrackParameters())
     with pytest.raises(ValueError, match="before the last step"):
         step_tracks([], 0.5, memory, TrackParameters())
+
+
+def test_a_track_that_pauses_stays_near_where_it_was_heard():
+    """For 0.6 s, another talker pulls its detections by 10 deg/s before it pauses."""
+    memory, at = TrackMemory(), []
+    for k in range(40):
+        pulled = 10.0 * max(0.0, 0.1 * k - 1.4)
+        heard = [detected(math.radians(pulled))] if k < 20 else []
+        tracks, memory = step_tracks(heard, 0.1 * k, memory, TrackParameters())
+        at += [math.degrees(track.bearing) for track in tracks]
+    # With the rate that it had then, it would be 15 deg away after 1.5 s.
+    assert 0.0 < at[-1] - 6.0 < 12.0
+
+
+@pytest.mark.parametrize(("bearing", "identities"), [(3.0, {1}), (60.0, {1, 2})])
+def test_a_source_that_sounds_again_at_its_place_has_its_identity_back(
+    bearing, identities
+):
+    def way(t):
+        return 0.0 if t < 2.0 else bearing if t > 5.0 else None
+
+    told = follow([way], 80)
+    assert {t.identity for _, tracks in told for t in tracks} == identities
+
+
+def test_after_a_long_time_it_is_another_source():
+    told = follow([lambda t: 0.0 if t < 2.0 or t > 14.0 else None], 170)
+    assert {t.identity for _, tracks in told for t in tracks} == {1, 2}
