@@ -93,7 +93,7 @@ def agree_sources(
     of_source = [_belonging(s, heard.tracks, estimates) for s in heard.sources]
     doubts = _doubts(heard, estimates, faults, shape, of_source)
     reasons = doubts.of_all + doubts.of_count
-    if not estimates and doubts.of_all and not heard.steady:
+    if not estimates and doubts.of_all:
         # Votes that cannot be relied upon are no answer by themselves.
         return AgreedSources([], [], reasons[0], [])
     sources, main = _joined(heard, estimates, shape, of_source, doubts)

@@ -245,6 +245,9 @@ def judged(
         sure: Whether the first source must have a confidence above 0.5.
         silent: Whether no estimate, or a refusal, is right as well.
         side: Side of the array on which the sources are.
+
+    Returns:
+        The outcome.
     """
     document = locate_answer(*make(), rate, side)
     if isinstance(document, str):
