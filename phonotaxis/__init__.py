@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from analysis.arrays.array_geometry import ArrayGeometry
-    from analysis.arrays.locate_result import SourceEstimate
+    from analysis.arrays.source_estimate import SourceEstimate
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.batches.plan import SweepPlan
     from analysis.run_error import RunError
@@ -87,7 +87,7 @@ _HOMES = {
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
-    "SourceEstimate": "analysis.arrays.locate_result",
+    "SourceEstimate": "analysis.arrays.source_estimate",
     "SourceListener": "analysis.arrays.voting.source_listener_block",
     "StabilityResult": "phonotaxis.loops",
     "SweepPlan": "analysis.batches.plan",

@@ -16,15 +16,19 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.voting.direction_votes import (
-    DirectionVotes,
-    VotePlan,
-    cast_votes,
-    join_votes,
+from analysis.arrays.voting.direction_votes import VotePlan, cast_votes
+from analysis.arrays.voting.source_listener import (
+    ListenerParameters,
+    are_unfit,
+    follow_sources,
 )
-from analysis.arrays.voting.source_listener import ListenerParameters, follow_sources
-from analysis.arrays.voting.source_tracks import SourceTrack
-from analysis.arrays.voting.vote_peaks import VotedSource, gather_sources
+from analysis.arrays.voting.track_state import SourceTrack
+from analysis.arrays.voting.vote_peaks import (
+    VotedSource,
+    gather_sources,
+    wrapped,
+)
+from analysis.arrays.voting.vote_records import DirectionVotes, join_votes
 from systems.sound.array_shape import ArrayShape
 
 # Samples per channel in each block of votes.
@@ -49,6 +53,10 @@ _NOT_TOLD = 0.5
 # and speech.
 _STEADY_DB = 4.4
 
+# Largest mean of how far the votes of a steady source stand out from the steady level.
+# It is about 0.01 for a fan beside a talker, and 0.8 for the talker.
+_STEADY_RISES = 0.25
+
 # A group of frames counts as sounding if its level is within _SOUNDS_DB of the quantile
 # _LOUD_SHARE of all levels. The sound must last at least _LEAST_S, s.
 _SOUNDS_DB, _LOUD_SHARE = 10.0, 0.9
@@ -67,24 +75,25 @@ class HeardSource:
     """Azimuth from the centroid of the microphones, CCW from +x, in (-180, 180], deg.
     """
     bearing_std_deg: float
-    """Standard deviation from the scatter of the votes for the source, deg. It does not
-    include errors of the array."""
+    """Standard deviation of the bearing, deg."""
     elevation_deg: float | None
     """Elevation from the x-y plane, deg. None if the array cannot measure it."""
+    elevation_std_deg: float | None
+    """Standard deviation of the elevation, deg."""
     share: float
-    """Share of all votes that belong to the source, 0 to 1."""
+    """Share of the source in the A-weighted power of all sources, 0 to 1."""
     confidence: float
     """Confidence that the source exists, 0 to 1."""
 
     @classmethod
-    def of(cls, voted: VotedSource) -> HeardSource:
-        """Makes a source from a peak of the votes, which has its angles in rad."""
-        height = voted.elevation
+    def of(cls, voted: VotedSource, power: float) -> HeardSource:
+        """Makes a source from a peak of the votes, and the power of all sources."""
         return cls(
             bearing_deg=math.degrees(voted.bearing),
             bearing_std_deg=math.degrees(voted.bearing_std),
-            elevation_deg=None if height is None else math.degrees(height),
-            share=voted.share,
+            elevation_deg=_degrees(voted.elevation),
+            elevation_std_deg=_degrees(voted.elevation_std),
+            share=voted.power / power if power > 0.0 else voted.share,
             confidence=voted.confidence,
         )
 
@@ -108,12 +117,21 @@ class HeardSources:
     """All sources and tracks in a recording."""
 
     sources: list[HeardSource] = field(default_factory=list)
-    """The sources. The source with most votes is first."""
+    """The sources. The loudest source is first."""
     tracks: list[FollowedSource] = field(default_factory=list)
     """The tracks, in the order of their beginnings."""
     steady: bool = False
     """Whether the sound is steady. The direction of most of a steady sound is known,
     but the number of its sources is unknown. No confidence then exceeds 0.5."""
+    beside_steady: bool = False
+    """Whether one of several sources is steady, such as a fan beside a talker. The
+    confidence of the steady source is then at most 0.5."""
+    unfit: bool = False
+    """Whether the phases are not those of sound from far away at this array. The
+    directions may then be wrong."""
+    side_lobes: bool = False
+    """Whether the microphones are so far apart that the steered response has side
+    lobes, which may be reported as sources."""
 
 
 _Told = TypeVar("_Told", HeardSource, FollowedSource)
@@ -141,13 +159,53 @@ def heard_sources(
     steady = is_steady(votes)
     if steady:
         votes = steered_only(votes)
-    sources = [HeardSource.of(voted) for voted in gather_sources(votes)]
+    found = gather_sources(votes)
+    # A fan may have most votes, but little weight beside a talker.
+    found += [
+        voted
+        for voted in gather_sources(votes, by_level=False)
+        if _is_fan(voted, votes) and not _is_known(voted, found)
+    ]
+    power = sum(voted.power for voted in found)
+    found.sort(key=lambda voted: -voted.power)
+    told = [
+        (HeardSource.of(voted, power), not steady and _is_fan(voted, votes))
+        for voted in found
+    ]
+    sources = [_doubted(source) if fan else source for source, fan in told]
     tracks = _tracks(votes, channels.shape[1] / sample_rate_hz, plan)
     sources = _counted_once(sources, tracks, votes)
     if steady:
         sources = [_doubted(source) for source in sources[:1]]
         tracks = [_doubted(track) for track in tracks]
-    return HeardSources(sources, tracks, steady)
+    return HeardSources(
+        sources,
+        tracks,
+        steady,
+        beside_steady=any(fan for _, fan in told),
+        unfit=is_unfit(votes),
+        side_lobes=plan.bins.start == plan.bins.stop,
+    )
+
+
+def is_unfit(votes: DirectionVotes) -> bool:
+    """Returns whether the phases are not those of sound from far away at the array."""
+    return are_unfit(votes.group_fits.sum(axis=0))
+
+
+def _is_known(voted: VotedSource, found: list[VotedSource]) -> bool:
+    near = math.radians(2.0 * _NEAR_DEG)
+    return any(abs(wrapped(voted.bearing - one.bearing)) < near for one in found)
+
+
+def _is_fan(voted: VotedSource, votes: DirectionVotes) -> bool:
+    """Returns whether a source is steady; of a short recording that is unknown."""
+    lasts_s = float(np.ptp(votes.group_t_s)) if votes.group_t_s.size else 0.0
+    return voted.rises < _STEADY_RISES and lasts_s >= _LEAST_S
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)
 
 
 def is_steady(votes: DirectionVotes) -> bool:

@@ -39,6 +39,9 @@ _LEAST_LEFT = 3
 # Least power that a level expresses, relative to full scale: -120 dB.
 _QUIET = 1e-12
 
+# Largest confidence while the phases do not fit the array.
+_NOT_SURE = 0.5
+
 # Largest magnitude of a valid sample; full scale is 1.
 _WILD = 1e3
 
@@ -227,6 +230,7 @@ def listen_to(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardS
 
 def track_document(step: HeardStep) -> list[dict[str, Any]]:
     """Makes a JSON object for each source of a step. Angles are in deg."""
+    most = _NOT_SURE if step.sources.unfit else 1.0
     return [
         {
             "t_s": round(step.sources.t_s, 6),
@@ -236,7 +240,7 @@ def track_document(step: HeardStep) -> list[dict[str, Any]]:
             "elevation_deg": None
             if track.elevation is None
             else round(math.degrees(track.elevation), 3),
-            "confidence": round(track.confidence, 4),
+            "confidence": round(min(track.confidence, most), 4),
             "sounding": round(track.sounding, 4),
         }
         for track in step.sources.tracks

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
 from analysis.arrays.channel_faults import ChannelFault
-from analysis.arrays.heard_sources import heard_sources
-from analysis.arrays.locate_result import LocatedSource, SourceEstimate
+from analysis.arrays.far_field import locate_far_source
+from analysis.arrays.heard_sources import HeardSource, heard_sources
+from analysis.arrays.locate_result import LocatedSource
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
     SNAPSHOTS,
@@ -22,6 +25,7 @@ from analysis.arrays.recording_spectra import (
     OnsetSpectra,
     RecordingSpectra,
 )
+from analysis.arrays.source_estimate import SourceEstimate
 from analysis.arrays.source_placement import has_place, place_source
 from analysis.arrays.wavefront_misfit import late_channel
 
@@ -31,6 +35,9 @@ _CLEAR = 0.5
 
 # Largest error of the distances between microphones, in standard deviations.
 _SLACK = 4.0
+
+# Standard deviation of a bearing of which nothing is known, deg.
+_ANY_STD_DEG = 180.0 / math.sqrt(3.0)
 
 # Faults that make channels appear late.
 _EXPLAINS_LATENESS = ("size", "near")
@@ -96,8 +103,29 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
         heard.estimates,
         len(search.stretches),
         heard.faults,
-        sources,
+        replace(sources, sources=[_with_errors(s, known) for s in sources.sources]),
         known.largest_range_error,
+    )
+
+
+def _with_errors(source: HeardSource, array: KnownArray) -> HeardSource:
+    """Adds the errors of the array to the standard deviations of a source of votes."""
+    shape, c = array.shape, array.c
+    azimuth, height = np.radians([source.bearing_deg, source.elevation_deg or 0.0])
+    level = np.array([math.cos(azimuth), math.sin(azimuth)]) * math.cos(height)
+    u = np.append(level, math.sin(height))[: shape.p_AM.shape[1]]
+    tau = -(shape.p_AM[1:] - shape.p_AM[0]) @ u / c
+    errors = array.budget.delay_covariance(u, 0.0, shape, c)
+    fix = locate_far_source(tau, errors, shape, c)
+    elevation_std = source.elevation_std_deg
+    if elevation_std is not None and fix.elevation_std is not None:
+        elevation_std = math.hypot(elevation_std, math.degrees(fix.elevation_std))
+    # Nothing is known of the bearing of a source straight above the array.
+    bearing_std = math.hypot(source.bearing_std_deg, math.degrees(fix.bearing_std))
+    return replace(
+        source,
+        bearing_std_deg=min(bearing_std, _ANY_STD_DEG),
+        elevation_std_deg=elevation_std,
     )
 
 

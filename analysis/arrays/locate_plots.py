@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.arrays.cramer_rao import polar_point
-from analysis.arrays.locate_result import LocatedSource, wrapped_deg
+from analysis.arrays.locate_result import LocatedSource
+from analysis.arrays.place_medians import wrapped_deg
 from analysis.report.palette import COLORS, ROBOT_COLORS, draw_grid
 from analysis.report.plain_values import write_json
 

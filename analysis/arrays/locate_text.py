@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from analysis.arrays.locate_result import LocatedSource, SourceEstimate
+from typing import Any
+
+from analysis.arrays.locate_result import LocatedSource
+from analysis.arrays.source_estimate import SourceEstimate
 
 _WHY_NOTHING = (
     "; the recording is silent or noise, or the positions (in m) or the speed of "
@@ -22,7 +25,7 @@ _COLUMNS = (
 def locate_text(result: LocatedSource) -> str:
     """Describes a result by a summary and one row per estimate."""
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
-    if not result.estimates:
+    if not result.estimates and not result.agreed.sources:
         return f"{heard}: nothing to locate{_WHY_NOTHING}"
     lines = [heard, *_direction(result), _range(result), *_sources(result)]
     lines.append("")
@@ -37,8 +40,7 @@ def _direction(result: LocatedSource) -> list[str]:
     if summary["bearing_deg"] is not None:
         parts.append(
             f"bearing {summary['bearing_deg']:.2f} deg (std "
-            f"{summary['bearing_std_deg']:.2f}, of which "
-            f"{summary['bearing_systematic_deg']:.2f} from errors of array and air)"
+            f"{summary['bearing_std_deg']:.2f}{_of_array(summary)})"
         )
     if summary["elevation_deg"] is not None:
         parts.append(
@@ -60,8 +62,15 @@ def _direction(result: LocatedSource) -> list[str]:
     return lines
 
 
+def _of_array(summary: dict[str, Any]) -> str:
+    part = summary["bearing_systematic_deg"]
+    return "" if part is None else f", of which {part:.2f} from errors of array and air"
+
+
 def _range(result: LocatedSource) -> str:
     summary = result.main_source()
+    if not summary["frames_of_main_source"]:
+        return "no frame gives its place; its direction is that of single frequencies"
     ranges = [e.range_m for e in result.estimates if e.range_m is not None]
     if summary["range_m"] is None and ranges:
         return (
@@ -79,12 +88,12 @@ def _range(result: LocatedSource) -> str:
 
 
 def _sources(result: LocatedSource) -> list[str]:
-    sources = result.heard.sources
-    if result.heard.steady:
-        return ["the sound is steady: the number of sources is unknown"]
+    sources, doubt = result.agreed.sources, result.agreed.doubt
+    lines = [] if doubt is None else [f"{doubt}: the number of sources is unknown"]
     if len(sources) < 2:
-        return []
-    lines = [f"{len(sources)} sources; the lines above describe the main source"]
+        return lines
+    listed = "directions" if doubt else "sources"
+    lines.append(f"{len(sources)} {listed}; the lines above describe the main source")
     lines += [
         f"  bearing {source.bearing_deg:7.1f} deg, {100.0 * source.share:3.0f} % of "
         f"what is heard, confidence {source.confidence:.2f}"

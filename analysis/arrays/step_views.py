@@ -10,7 +10,7 @@ from typing import TextIO
 
 from analysis.arrays.live_hearing import HeardStep, track_document
 from analysis.arrays.voting.source_listener import TrackedSources
-from analysis.arrays.voting.source_tracks import SourceTrack
+from analysis.arrays.voting.track_state import SourceTrack
 
 # _COLUMNS: largest number of columns of the compass. It is odd so that the direction
 #   ahead is in the middle.

@@ -15,8 +15,8 @@ import pyroomacoustics as pra
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from analysis.arrays.voting.direction_votes import DirectionVotes
 from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_records import DirectionVotes
 from studies.support.talker_rooms import RATE, Recording
 
 C = 343.0
@@ -124,5 +124,14 @@ def _votes(azimuth: list[float]) -> DirectionVotes:
     around = (np.array(azimuth) + math.pi) % (2.0 * math.pi) - math.pi
     ones = np.ones(around.size)
     return DirectionVotes(
-        ones, around, np.nan * ones, ones, ones > 0, np.empty(0), np.empty((0, 1))
+        t_s=ones,
+        azimuth=around,
+        elevation=np.nan * ones,
+        weight=ones,
+        power=ones,
+        rises=ones,
+        steered=ones > 0,
+        group_t_s=np.empty(0),
+        group_levels_db=np.empty((0, 1)),
+        group_fits=np.empty((0, 2)),
     )

@@ -22,6 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from analysis.arrays.voting.bin_levels import (
+    a_weight,
+    levels_db,
+    louder_bins,
+    no_levels,
+    risen_bins,
+    standing_out,
+)
 from analysis.arrays.voting.single_waves import (
     GROUP_FRAMES,
     PhasePlane,
@@ -29,6 +37,12 @@ from analysis.arrays.voting.single_waves import (
     group_powers,
 )
 from analysis.arrays.voting.steered_votes import SteeredSearch
+from analysis.arrays.voting.vote_records import (
+    DirectionVotes,
+    cast_of,
+    join_votes,
+    no_votes,
+)
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 
@@ -37,20 +51,8 @@ _FRAME_S = 0.032
 _CROSSINGS = 6.0
 _HOPS = 4
 
-# _WEAKEST: share of the bins that do not vote because their power is lowest.
-# _FOLLOW: rate at which the power limit of these bins adapts, per hop.
-_WEAKEST, _FOLLOW = 0.3, 0.1
-
-# _RISE: least power of a voting bin, as a multiple of the remaining echo.
-# _DECAY_DB_S: decay of the echo, dB/s, as in a room with the reverberation time T60 = 1
-#   s.
-_RISE, _DECAY_DB_S = 1.6, 62.5
-
 # Least ratio of the two largest eigenvalues of the covariance in a bin with one wave.
 _LEAST_RATIO = 20.0
-
-# Number of frequencies whose levels are stored.
-_LEVELS = 24
 
 # Highest frequency to use, Hz. Lower frequencies suffice to separate speech and most
 # noises.
@@ -61,38 +63,6 @@ _HIGHEST_HZ = 8_000.0
 _LEAST_HIGHEST_HZ = 1_000.0
 
 _SPEEDS_M_S = (100.0, 2_000.0)
-
-
-class DirectionVotes(NamedTuple):
-    """Votes for directions in the order of time, and levels of the sound over time.
-
-    A vote is an estimated direction of the sound in a group of consecutive frames.
-    """
-
-    t_s: NDArray[np.float64]
-    """(k,) middles of the groups of the votes, s from the first sample."""
-    azimuth: NDArray[np.float64]
-    """(k,) azimuths from +x towards +y, in (-pi, pi], rad. They are on the side of
-    ``shape.ahead``."""
-    elevation: NDArray[np.float64]
-    """(k,) elevations above the x-y plane, rad. NaN if the array cannot measure them.
-    """
-    weight: NDArray[np.float64]
-    """(k,) weights. The weight of a single bin is its frequency, Hz. The weight of a
-    steered vote is its response, 0 to 1."""
-    steered: NDArray[np.bool_]
-    """(k,) True for a vote of the steered response, False for a vote of a single bin.
-    """
-    group_t_s: NDArray[np.float64]
-    """(g,) middles of all groups of frames, s from the first sample."""
-    group_levels_db: NDArray[np.float64]
-    """(g, 24) power of all channels at 24 frequencies of the band, dB relative to the
-    unit of the samples."""
-
-    def part(self, votes: Any, groups: slice) -> DirectionVotes:
-        """Returns the votes with some indices, and the levels of some groups."""
-        kept = [each[votes] for each in self[:5]] + [each[groups] for each in self[5:]]
-        return DirectionVotes._make(kept)
 
 
 class VoteMemory(NamedTuple):
@@ -106,6 +76,8 @@ class VoteMemory(NamedTuple):
     """Power limit of the weakest bins; 0 before the first sound."""
     echo: NDArray[np.float32]
     """(b,) largest remaining echo of earlier sound in each bin, as power."""
+    steady_db: NDArray[np.float32]
+    """(b,) level of the steady sound in each bin, dB; empty before the first group."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +151,7 @@ class VotePlan:
         """Returns the memory before the first block."""
         tail = np.zeros((self.shape.count, 0), np.float32)
         echo = np.zeros(max(0, self.bins.stop - self.bins.start), np.float32)
-        return VoteMemory(tail, 0, 0.0, echo)
+        return VoteMemory(tail, 0, 0.0, echo, no_levels())
 
     @property
     def group_samples(self) -> int:
@@ -204,7 +176,7 @@ def cast_votes(
     samples = np.concatenate((memory.tail, _checked(plan, block)), axis=1)
     groups = (samples.shape[1] - plan.group_samples) // plan.hop + 1
     if groups < 1:
-        return _no_votes(), memory._replace(tail=samples)
+        return no_votes(), memory._replace(tail=samples)
     size = len(plan.window)
     frames = np.lib.stride_tricks.sliding_window_view(samples, size, axis=1)
     frames = frames[:, : (groups + GROUP_FRAMES - 1) * plan.hop : plan.hop]
@@ -216,28 +188,48 @@ def cast_votes(
     searched = group_powers(spectra[:, :, plan.steered.bins])
     bins = group_powers(spectra[:, :, plan.bins])
     powers = bins if bins.shape[1] else searched
-    loud, level = _louder(powers, memory.level)
+    loud, level = louder_bins(powers, memory.level)
+    hop_s = plan.hop / plan.sample_rate_hz
+    rises, steady_db = standing_out(powers, memory.steady_db, hop_s)
+    used = plan.bins if bins.shape[1] else plan.steered.bins
+    heard = powers * a_weight(used, len(plan.window) / plan.sample_rate_hz)
     cast = [
-        _steered_votes(plan, spectra, np.asarray(loud.any(axis=1)), t_s, memory.groups)
+        _steered_votes(
+            plan,
+            spectra,
+            _Groups(t_s, heard.sum(axis=1), rises.mean(axis=1)),
+            np.asarray(loud.any(axis=1)),
+            memory.groups,
+        )
     ]
-    fresh, echo = _risen(bins, memory.echo, plan.hop / plan.sample_rate_hz)
+    fresh, echo = risen_bins(bins, memory.echo, hop_s)
+    fitted = np.zeros((groups, 2))
     if bins.shape[1]:
-        cast.append(_bin_votes(plan, spectra[:, :, plan.bins], loud & fresh, t_s))
+        single, fitted = _bin_votes(
+            plan,
+            spectra[:, :, plan.bins],
+            _Groups(t_s, heard, rises),
+            loud & fresh,
+        )
+        cast.append(single)
     votes = join_votes(cast)
     tail = samples[:, groups * plan.hop :]
-    after = VoteMemory(tail, memory.groups + groups, level, echo)
-    return votes._replace(group_t_s=t_s, group_levels_db=_levels_db(powers)), after
-
-
-def join_votes(parts: list[DirectionVotes]) -> DirectionVotes:
-    """Joins the votes for directions from several blocks in the order of time."""
-    if not parts:
-        return _no_votes()
-    joined = DirectionVotes._make(
-        np.concatenate(each) for each in zip(*parts, strict=True)
+    after = VoteMemory(tail, memory.groups + groups, level, echo, steady_db)
+    told = votes._replace(
+        group_t_s=t_s, group_levels_db=levels_db(powers), group_fits=fitted
     )
-    order = np.argsort(joined.t_s, kind="stable")
-    return joined.part(order, slice(None))
+    return told, after
+
+
+class _Groups(NamedTuple):
+    """Groups of frames, or their bins, from which votes come."""
+
+    t_s: NDArray[np.float64]
+    """(g,) middles of the groups, s."""
+    power: NDArray[Any]
+    """(g,) or (g, b) A-weighted power."""
+    rises: NDArray[Any]
+    """(g,) or (g, b) how far the sound stands out, 0 to 1."""
 
 
 def _check(c: float, sample_rate_hz: float, band_hz: tuple[float, float]) -> None:
@@ -278,71 +270,11 @@ def _checked(
     return samples
 
 
-def _no_votes() -> DirectionVotes:
-    none = np.empty(0)
-    return _cast(none, none, none, none, steered=False)
-
-
-def _cast(
-    t_s: NDArray[np.float64],
-    azimuth: NDArray[np.float64],
-    elevation: NDArray[np.float64],
-    weight: NDArray[np.float64],
-    *,
-    steered: bool,
-) -> DirectionVotes:
-    """Makes votes of one kind, without the times and levels of the groups."""
-    kind = np.full(len(t_s), steered)
-    levels = np.empty((0, _LEVELS))
-    return DirectionVotes(t_s, azimuth, elevation, weight, kind, np.empty(0), levels)
-
-
-def _levels_db(powers: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Returns (g, 24) levels of single bins in dB, with equal numbers per octave."""
-    last = powers.shape[1] - 1
-    kept = np.rint(np.geomspace(1.0, last + 1.0, _LEVELS)).astype(int) - 1
-    chosen = powers[:, kept].astype(np.float64)
-    return np.asarray(10.0 * np.log10(np.maximum(chosen, 1e-30)))
-
-
-def _louder(
-    powers: NDArray[np.float32], level: float
-) -> tuple[NDArray[np.bool_], float]:
-    """Finds the (g, b) bins whose power is above an adaptive limit.
-
-    The limit adapts from group to group, so that about 30 % of the bins are below it.
-    The other result is the limit after the last group.
-    """
-    loud = np.zeros(powers.shape, dtype=bool)
-    for row, kept in zip(powers, loud, strict=True):
-        if not level > 0.0:
-            level = float(np.quantile(row, _WEAKEST))
-        np.greater(row, level, out=kept)
-        below = 1.0 - kept.mean()
-        level *= math.exp(_FOLLOW * (_WEAKEST - below))
-    return loud, level
-
-
-def _risen(
-    powers: NDArray[np.float32], echo: NDArray[np.float32], hop_s: float
-) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
-    """Finds the (g, b) bins that are louder than the echo of earlier sound.
-
-    The other result is the (b,) largest possible echo after the last group.
-    """
-    decay = np.float32(10.0 ** (-0.1 * _DECAY_DB_S * hop_s))
-    fresh = np.empty(powers.shape, dtype=bool)
-    for row, kept in zip(powers, fresh, strict=True):
-        np.greater(row, np.float32(_RISE) * echo, out=kept)
-        echo = np.maximum(row, decay * echo)
-    return fresh, echo
-
-
 def _steered_votes(
     plan: VotePlan,
     spectra: NDArray[np.complex64],
+    of: _Groups,
     loud: NDArray[np.bool_],
-    t_s: NDArray[np.float64],
     groups: int,
 ) -> DirectionVotes:
     """Computes votes for the directions at which the steered response is greatest.
@@ -351,33 +283,48 @@ def _steered_votes(
     frames in common.
     """
     found = []
-    times = []
+    voting: list[int] = []
     first = -groups % GROUP_FRAMES
-    for g in range(first, len(t_s), GROUP_FRAMES):
+    for g in range(first, len(of.t_s), GROUP_FRAMES):
         if loud[g]:
             votes = plan.steered.votes(spectra[g : g + GROUP_FRAMES])
             found.append(votes)
-            times.append(np.full(len(votes[0]), t_s[g]))
+            voting += [g] * len(votes[0])
     if not found:
-        return _no_votes()
+        return no_votes()
     azimuth, elevation, weight = (np.concatenate(e) for e in zip(*found, strict=True))
-    return _cast(np.concatenate(times), azimuth, elevation, weight, steered=True)
+    parts = (of.t_s[voting], azimuth, elevation, weight)
+    return cast_of(*parts, of.power[voting], of.rises[voting], steered=True)
 
 
 def _bin_votes(
     plan: VotePlan,
     spectra: NDArray[np.complex64],
+    of: _Groups,
     loud: NDArray[np.bool_],
-    t_s: NDArray[np.float64],
-) -> DirectionVotes:
-    """Computes the votes of single bins that contain only one wave."""
+) -> tuple[DirectionVotes, NDArray[np.float64]]:
+    """Computes the votes of single bins that contain only one wave.
+
+    The other result is ``DirectionVotes.group_fits``.
+    """
     group, bins, pattern = find_rank_one(spectra, loud, _LEAST_RATIO)
     frequency = plan.frequencies_hz[bins]
     fits = plan.plane.fit(pattern, frequency)
-    return _cast(
-        t_s[group[fits.fits]],
+    told = np.stack(
+        (
+            np.bincount(group, minlength=len(of.t_s)),
+            np.bincount(group[fits.clearly], minlength=len(of.t_s)),
+        ),
+        axis=1,
+    )
+    at = group[fits.fits], bins[fits.fits]
+    votes = cast_of(
+        of.t_s[at[0]],
         fits.azimuth,
         fits.elevation,
         frequency[fits.fits],
+        of.power[at],
+        of.rises[at],
         steered=False,
     )
+    return votes, told.astype(np.float64)

@@ -30,10 +30,10 @@ _LEAST_SPAN = 0.3
 # Largest ratio of the lengths of two pairs that count as equally long.
 _ALIKE = 1.05
 
-#: _LARGEST: largest measured slowness along the line or plane of an array. It may
-#:   exceed 1 because phases are noisy.
-#: _LEAST_LEVEL: least horizontal component of a direction. A source with a smaller
-#:   component is nearly overhead, where a bearing has no meaning.
+# _LARGEST: largest measured slowness along the line or plane of an array. It may
+#   exceed 1 because phases are noisy.
+# _LEAST_LEVEL: least horizontal component of a direction, for arrays that cannot
+#   measure elevations. A source with a smaller component is not level with the array.
 _LARGEST, _LEAST_LEVEL = 1.08, 0.35
 # Least measured slowness of an array in space, which measures all components. The true
 # value is 1.
@@ -56,6 +56,11 @@ _MOST_GUESSES = 4_000
 # Largest root-mean-square phase error of all pairs relative to a plane wave, rad.
 _LARGEST_RESIDUAL_RAD = 0.6
 
+# Largest root-mean-square error of the path differences of a clear plane wave, as a
+# share of the distances between the microphones. In rooms, the median is 0.05; if the
+# channels are in a wrong order or late, it is 0.2 or more.
+_CLEAR_MISFIT = 0.12
+
 
 class PlaneFits(NamedTuple):
     """Directions of the bins to which a plane wave fits.
@@ -69,6 +74,10 @@ class PlaneFits(NamedTuple):
     """(m,) elevations, rad. NaN if the array cannot measure them."""
     fits: NDArray[np.bool_]
     """(k,) True for the m of k bins to which a plane wave fits."""
+    clearly: NDArray[np.bool_]
+    """(k,) True for the bins whose phases are clearly those of a plane wave at the
+    speed of sound. If the positions or the order of the microphones are wrong, few bins
+    are."""
 
 
 @dataclass(frozen=True)
@@ -156,14 +165,19 @@ class PhasePlane:
         u, length = self._directions(slowness)
         level = np.hypot(u[:, 0], u[:, 1])
         fits = clear & (residual < _LARGEST_RESIDUAL_RAD)
-        fits &= (length <= _LARGEST) & (level >= _LEAST_LEVEL)
+        wide = np.sqrt(np.mean(self.shape.distances_m**2))
+        misfit = residual / (number[:, 0] * wide)
+        clearly = clear & (misfit < _CLEAR_MISFIT) & (length <= _LARGEST)
+        fits &= length <= _LARGEST
+        if "elevation" not in self.shape.angles:
+            fits &= level >= _LEAST_LEVEL
         if self.shape.ahead is None and self.shape.dimension == 3:
             fits &= length >= _LEAST_IN_SPACE
         u = u[fits]
         elevation = np.full(len(u), np.nan)
         if "elevation" in self.shape.angles:
             elevation = np.arctan2(u[:, 2], np.hypot(u[:, 0], u[:, 1]))
-        return PlaneFits(np.arctan2(u[:, 1], u[:, 0]), elevation, fits)
+        return PlaneFits(np.arctan2(u[:, 1], u[:, 0]), elevation, fits, clearly)
 
     def _guessed(
         self, phase: NDArray[np.float64], number: NDArray[np.float64]

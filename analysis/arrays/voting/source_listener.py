@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.voting.direction_votes import (
-    DirectionVotes,
-    VoteMemory,
-    VotePlan,
-    cast_votes,
-    join_votes,
-)
-from analysis.arrays.voting.source_tracks import (
-    SourceTrack,
-    TrackMemory,
-    TrackParameters,
-    step_tracks,
-)
-from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.direction_votes import VoteMemory, VotePlan, cast_votes
+from analysis.arrays.voting.source_tracks import TrackMemory, step_tracks
+from analysis.arrays.voting.track_state import SourceTrack, TrackParameters
+from analysis.arrays.voting.vote_peaks import gather_turning
+from analysis.arrays.voting.vote_records import DirectionVotes, join_votes
 from systems.framework.parameters import Parameters, Positive
 
 # _VOTES_S: least number of bins that vote for a source, per second of the window.
 # _LEAST_VOTES: least number of bins that vote for a source in any window.
 _VOTES_S, _LEAST_VOTES = 20.0, 6.0
+
+# Least share of the bins with one wave whose phases must be those of a plane wave. In
+# rooms and at an SNR of 0 dB it is 0.65 or more. If channels are late or in a wrong
+# order, or if the positions are not in m, it is below 0.5.
+_LEAST_FITTING = 0.55
+# Least number of bins for which this share is known, and the time over which live sound
+# is judged, s.
+_LEAST_BINS, _FITTING_S = 30, 5.0
 
 # Factor for the error of a detection. Windows overlap, so consecutive detections have
 # similar errors.
@@ -52,6 +52,17 @@ class TrackedSources:
     """End of the sound in which the sources were heard, s."""
     tracks: tuple[SourceTrack, ...]
     """Tracks of the sources. The oldest track is first."""
+    unfit: bool = False
+    """Whether the phases of the last seconds are not those of sound from far away at
+    this array. The bearings may then be wrong."""
+
+
+class _Tracking(NamedTuple):
+    """All tracks, and how well the phases of the last seconds fit the array."""
+
+    tracks: TrackMemory
+    fits: NDArray[np.float64]
+    """(2,) sums of ``DirectionVotes.group_fits``, in which older groups fade."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +74,7 @@ class ListenerMemory:
 
     votes: VoteMemory
     recent: DirectionVotes
-    tracks: TrackMemory
+    tracks: _Tracking
     samples: int
     """Number of samples per channel so far."""
     steps: int
@@ -72,7 +83,7 @@ class ListenerMemory:
     @classmethod
     def blank(cls, plan: VotePlan) -> ListenerMemory:
         """Makes the state before the first block."""
-        return cls(plan.blank(), join_votes([]), TrackMemory(), 0, 0)
+        return cls(plan.blank(), join_votes([]), _no_tracks(), 0, 0)
 
     def after_gap(self, plan: VotePlan, *, keeps_tracks: bool) -> ListenerMemory:
         """Returns the state after missing samples or a change of the channels.
@@ -83,8 +94,11 @@ class ListenerMemory:
         # The first group of frames after the gap begins at most one hop from its exact
         # time.
         votes = plan.blank()._replace(groups=round(self.samples / plan.hop))
-        tracks = self.tracks if keeps_tracks else replace(self.tracks, tracks=())
-        return replace(self, votes=votes, recent=join_votes([]), tracks=tracks)
+        tracks = self.tracks.tracks
+        if not keeps_tracks:
+            tracks = replace(tracks, tracks=(), ended=())
+        after = _no_tracks()._replace(tracks=tracks)
+        return replace(self, votes=votes, recent=join_votes([]), tracks=after)
 
 
 def hear_sources(
@@ -132,7 +146,7 @@ def follow_sources(
 
     The result is that of ``hear_sources``.
     """
-    memory, found = TrackMemory(), []
+    memory, found = _no_tracks(), []
     # The time of a vote is the middle of its samples. In live sound, the vote exists
     # only after its last sample.
     late = 0.5 * plan.group_samples / plan.sample_rate_hz - 1e-9
@@ -144,19 +158,34 @@ def follow_sources(
     return found
 
 
+def are_unfit(fits: NDArray[np.float64]) -> bool:
+    """Returns whether a (2,) sum of ``group_fits`` shows that the array is wrong."""
+    waves, fitting = fits
+    return bool(waves >= _LEAST_BINS and fitting < _LEAST_FITTING * waves)
+
+
+def _no_tracks() -> _Tracking:
+    return _Tracking(TrackMemory(), np.zeros(2))
+
+
 def _tracked(
     votes: DirectionVotes,
     t_s: float,
-    memory: TrackMemory,
+    memory: _Tracking,
     parameters: ListenerParameters,
-) -> tuple[TrackedSources, TrackMemory]:
+) -> tuple[TrackedSources, _Tracking]:
     least = max(_LEAST_VOTES, _VOTES_S * parameters.window_s)
     detections = [
         source._replace(bearing_std=_OVERLAP * source.bearing_std)
-        for source in gather_sources(votes, least_votes=least)
+        for source in gather_turning(
+            votes, t_s - 0.5 * parameters.window_s, least_votes=least
+        )
     ]
-    told, memory = step_tracks(detections, t_s, memory, parameters.tracks)
-    return TrackedSources(t_s, tuple(told)), memory
+    told, tracks = step_tracks(detections, t_s, memory.tracks, parameters.tracks)
+    # Each group is in as many windows as a window has steps.
+    of_step = votes.group_fits.sum(axis=0) * parameters.step_s / parameters.window_s
+    fits = math.exp(-parameters.step_s / _FITTING_S) * memory.fits + of_step
+    return TrackedSources(t_s, tuple(told), are_unfit(fits)), _Tracking(tracks, fits)
 
 
 def _between(votes: DirectionVotes, begin: float, end: float) -> DirectionVotes:

@@ -18,101 +18,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field
 from scipy.optimize import linear_sum_assignment
 
+from analysis.arrays.voting.track_state import (
+    BIAS_STD,
+    GATE,
+    SourceTrack,
+    TrackParameters,
+    apart_rad,
+    born,
+    heard,
+    missed,
+    predicted,
+    scatter,
+)
 from analysis.arrays.voting.vote_peaks import VotedSource, wrapped
-from systems.framework.parameters import Fraction, Parameters, Positive
 
-# Largest distance of a detection from its track, in standard deviations.
-_GATE = 3.5
-
-# _FALLS_SILENT: rate at which a sounding source pauses, 1/s.
-# _SPEAKS_AGAIN: rate at which a pausing source sounds again, 1/s.
-# _GOES: rate at which a source disappears, 1/s.
-_FALLS_SILENT, _SPEAKS_AGAIN, _GOES = 1.0, 2.0, 0.2
-
-# _BORN: probability that the first detection of a track is from a source.
-# _RATE_STD: standard deviation of the bearing rate of a new track, rad/s.
-_BORN, _RATE_STD = 0.05, 0.4
-
-
-class TrackParameters(Parameters):
-    """Parameters of the motion and the detection of sources."""
-
-    acceleration_std_deg_s2: Positive = 6.0
-    """Standard deviation of the change of a source's bearing rate within one second,
-    deg/s^2."""
-    rate_memory_s: Positive = 8.0
-    """Time constant with which the estimated bearing rate decays, s."""
-    detection_probability: Fraction = 0.7
-    """Probability that a sounding source is detected in a step."""
-    false_detections: Positive = 0.05
-    """Mean number of false detections per step, over the whole circle."""
-    smear_s: Positive = 0.15
-    """Time that determines the scatter of the detections of a moving source, s. The
-    scatter is the motion of the source in this time."""
-    resolution_deg: float = Field(default=20.0, gt=0.0, le=90.0)
-    """Angle below which two sources may give only one detection, deg."""
-    begins_after_s: Positive = 0.25
-    """Least age of a track that is reported, s."""
-    least_share: Fraction = 0.25
-    """Least share of the heard sound for the first detection of a track. The mean share
-    of its detections must also be at least this value when the track is reported."""
-    least_hits: int = Field(default=4, ge=1, le=100)
-    """Least number of detections of a track that is reported."""
-    ends_after_s: Positive = 1.5
-    """Time without a detection after which a track ends, s. A detection that the track
-    shares with a nearby track also counts."""
-    hidden_s: Positive = 3.0
-    """Time without a detection of its own after which a track ends, s. It limits how
-    long a nearby track may hide a track."""
-
-
-@dataclass(frozen=True)
-class SourceTrack:
-    """Track of one source."""
-
-    identity: int
-    """Number of the track, from 1. It is never used again. It is 0 until the track is
-    reported."""
-    bearing: float
-    """Bearing, in (-pi, pi], rad."""
-    rate: float
-    """Rate of the bearing, rad/s."""
-    covariance: NDArray[np.float64] = field(repr=False)
-    """(2, 2) covariance of the bearing, rad, and its rate, rad/s."""
-    elevation: float | None
-    """Weighted mean of the latest elevations, rad. None if the array cannot measure
-    them."""
-    sounding: float
-    """Probability that the source exists and sounds."""
-    silent: float
-    """Probability that the source exists and pauses."""
-    t_born: float
-    """Time of the first detection, s."""
-    t_heard: float
-    """Time of the last detection that is assigned to this track, s."""
-    t_shared: float
-    """Time of the last detection that this track shared with another track, s."""
-    hits: int
-    """Number of detections so far."""
-    share: float
-    """Mean share of the sound that its detections had in their steps, 0 to 1."""
-
-    @property
-    def confidence(self) -> float:
-        """Probability that the source exists."""
-        return self.sounding + self.silent
-
-    @property
-    def bearing_std(self) -> float:
-        """Standard deviation of the bearing, rad."""
-        return math.sqrt(float(self.covariance[0, 0]))
+# Largest angle between a detection and its track, rad.
+_FARTHEST = math.radians(45.0)
 
 
 @dataclass(frozen=True)
@@ -120,6 +46,8 @@ class TrackMemory:
     """All tracks, including those that are not reported yet."""
 
     tracks: tuple[SourceTrack, ...] = ()
+    ended: tuple[SourceTrack, ...] = ()
+    """Tracks that have ended, but whose identities are remembered."""
     t_s: float | None = None
     """Time of the last step, s. None before the first step."""
     next_identity: int = 1
@@ -139,7 +67,7 @@ def step_tracks(
     elapsed = 0.0 if memory.t_s is None else t_s - memory.t_s
     if elapsed < 0.0:
         raise ValueError(f"t_s: {t_s:g} s is before the last step, {memory.t_s:g} s")
-    tracks = [_predicted(track, elapsed, parameters) for track in memory.tracks]
+    tracks = [predicted(track, t_s, elapsed, parameters) for track in memory.tracks]
     chosen = _assigned(tracks, detections, parameters)
     hidden = _hidden(tracks, detections, chosen, parameters)
     moved = [
@@ -147,49 +75,52 @@ def step_tracks(
         if i in hidden
         else replace(track, t_shared=t_s, t_heard=t_s)
         if i in hidden.values()
-        else _missed(track, parameters)
+        else missed(track, parameters)
         if k is None
-        else _heard(track, detections[k], t_s, parameters)
+        else heard(track, detections[k], t_s, parameters)
         for i, (track, k) in enumerate(zip(tracks, chosen, strict=True))
     ]
     taken = {k for k in chosen if k is not None}
     new = [
-        _born(detection, t_s)
+        born(detection, t_s)
         for k, detection in enumerate(detections)
         if k not in taken and detection.share >= parameters.least_share
     ]
-    alive = _single([t for t in moved if not _over(t, t_s, parameters)], parameters)
-    identity, kept = memory.next_identity, []
+    over = [t for t in moved if _over(t, t_s, parameters)]
+    alive = _single([t for t in moved if t not in over], parameters)
+    ended = [
+        track
+        for track in (*memory.ended, *over)
+        if track.identity and t_s - track.t_heard <= parameters.remembered_s
+    ]
+    identity, kept = memory.next_identity, [*alive, *new]
     for track in alive + new:
-        if track.identity == 0 and _is_told(track, t_s, parameters):
+        if track.identity or not _is_told(track, t_s, parameters):
+            continue
+        kept.remove(track)
+        old = _returned(track, [t for t in kept if t.identity] + ended, parameters)
+        if old is None:
             kept.append(replace(track, identity=identity))
             identity += 1
         else:
-            kept.append(track)
+            kept = [t for t in kept if t is not old]
+            ended = [t for t in ended if t is not old]
+            kept.append(replace(track, identity=old.identity))
     told = sorted((t for t in kept if t.identity > 0), key=lambda t: t.identity)
-    return told, TrackMemory(tuple(kept), t_s, identity)
+    return told, TrackMemory(tuple(kept), tuple(ended), t_s, identity)
 
 
-def _predicted(track: SourceTrack, dt: float, p: TrackParameters) -> SourceTrack:
-    forget = math.exp(-dt / p.rate_memory_s)
-    F = np.array([[1.0, dt], [0.0, forget]])
-    q = math.radians(p.acceleration_std_deg_s2) ** 2
-    Q = q * np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
-    falls, again = _FALLS_SILENT * dt, _SPEAKS_AGAIN * dt
-    stays = math.exp(-_GOES * dt)
-    # Exact share of changes within dt in a Markov chain with two states.
-    part = -math.expm1(-(falls + again)) / max(falls + again, 1e-12)
-    to_silent, to_sounding = falls * part, again * part
-    sounding = track.sounding * (1.0 - to_silent) + track.silent * to_sounding
-    silent = track.silent * (1.0 - to_sounding) + track.sounding * to_silent
-    return replace(
-        track,
-        bearing=wrapped(track.bearing + dt * track.rate),
-        rate=forget * track.rate,
-        covariance=F @ track.covariance @ F.T + Q,
-        sounding=stays * sounding,
-        silent=stays * silent,
-    )
+def _returned(
+    track: SourceTrack, others: Sequence[SourceTrack], p: TrackParameters
+) -> SourceTrack | None:
+    """Returns the nearest track that was last heard before a new track began."""
+    near = [
+        other
+        for other in others
+        if max(other.t_heard, other.t_shared) < track.t_born
+        and apart_rad(track, other) < math.radians(p.returns_within_deg)
+    ]
+    return min(near, key=lambda other: apart_rad(track, other), default=None)
 
 
 def _assigned(
@@ -202,13 +133,14 @@ def _assigned(
     cost = np.empty((len(tracks), len(detections)))
     for i, track in enumerate(tracks):
         for k, d in enumerate(detections):
-            variance = float(track.covariance[0, 0]) + _scatter(track, d, p)
+            variance = float(track.covariance[0, 0]) + scatter(track, d, p)
             off = wrapped(d.bearing - track.bearing)
             # Reported tracks have priority, so that a new track does not take their
             # detections.
             late = 0.0 if track.identity else 4.0
             cost[i, k] = off**2 / variance + math.log(variance) + late
-            if off**2 > _GATE**2 * variance:
+            wide = variance + BIAS_STD**2
+            if off**2 > GATE**2 * wide or apart_rad(d, track) > _FARTHEST:
                 cost[i, k] = np.inf
     finite = np.where(np.isfinite(cost), cost, 1e6)
     for i, k in zip(*linear_sum_assignment(finite), strict=True):
@@ -233,74 +165,12 @@ def _hidden(
             k = chosen[j]
             if k is None or not other.identity:
                 continue
-            apart = abs(wrapped(track.bearing - other.bearing))
-            off = abs(wrapped(detections[k].bearing - track.bearing))
+            apart = apart_rad(track, other)
+            off = apart_rad(detections[k], track)
             if apart < resolution and off < resolution:
                 hidden[i] = j
                 break
     return hidden
-
-
-def _scatter(track: SourceTrack, detection: VotedSource, p: TrackParameters) -> float:
-    """Returns the variance of a detection relative to its track, rad^2."""
-    rate_squared = track.rate**2 + float(track.covariance[1, 1])
-    return detection.bearing_std**2 + p.smear_s**2 * rate_squared
-
-
-def _heard(
-    track: SourceTrack, detection: VotedSource, t_s: float, p: TrackParameters
-) -> SourceTrack:
-    of_detection = _scatter(track, detection, p)
-    C = track.covariance
-    variance = float(C[0, 0]) + of_detection
-    off = wrapped(detection.bearing - track.bearing)
-    gain = C[:, 0] / variance
-    # Joseph's form of the covariance update keeps the covariance symmetric.
-    A = np.eye(2) - np.outer(gain, [1.0, 0.0])
-    height = math.exp(-0.5 * off**2 / variance) / math.sqrt(2.0 * math.pi * variance)
-    density = p.false_detections / (2.0 * math.pi)
-    ratio = 1.0 - p.detection_probability
-    ratio += p.detection_probability * height / density
-    sounding, silent = track.sounding * ratio, track.silent
-    whole = sounding + silent + 1.0 - track.confidence
-    elevation = detection.elevation
-    if elevation is not None and track.elevation is not None:
-        elevation = 0.7 * track.elevation + 0.3 * elevation
-    return replace(
-        track,
-        bearing=wrapped(track.bearing + float(gain[0]) * off),
-        rate=track.rate + float(gain[1]) * off,
-        covariance=A @ C @ A.T + of_detection * np.outer(gain, gain),
-        elevation=track.elevation if elevation is None else elevation,
-        sounding=sounding / whole,
-        silent=silent / whole,
-        t_heard=t_s,
-        hits=track.hits + 1,
-        share=track.share + (detection.share - track.share) / (track.hits + 1),
-    )
-
-
-def _missed(track: SourceTrack, p: TrackParameters) -> SourceTrack:
-    sounding = track.sounding * (1.0 - p.detection_probability)
-    whole = sounding + track.silent + 1.0 - track.confidence
-    return replace(track, sounding=sounding / whole, silent=track.silent / whole)
-
-
-def _born(detection: VotedSource, t_s: float) -> SourceTrack:
-    return SourceTrack(
-        identity=0,
-        bearing=wrapped(detection.bearing),
-        rate=0.0,
-        covariance=np.diag([detection.bearing_std**2, _RATE_STD**2]),
-        elevation=detection.elevation,
-        sounding=_BORN,
-        silent=0.0,
-        t_born=t_s,
-        t_heard=t_s,
-        t_shared=-math.inf,
-        hits=1,
-        share=detection.share,
-    )
 
 
 def _is_told(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
@@ -328,7 +198,7 @@ def _single(tracks: list[SourceTrack], p: TrackParameters) -> list[SourceTrack]:
     near = math.radians(0.5 * p.resolution_deg)
     for track in sorted(tracks, key=lambda t: (t.identity == 0, t.t_born)):
         again = track.identity == 0 and any(
-            abs(wrapped(track.bearing - other.bearing)) < near for other in kept
+            apart_rad(track, other) < near for other in kept
         )
         if not again:
             kept.append(track)

@@ -29,7 +29,9 @@ _LEAST_RESPONSE = 0.1
 # Least distance between two peaks, rad. A nearer peak is the slope of the higher one.
 _APART_RAD = math.radians(20.0)
 
-_LEAST_LEVEL = 0.35
+# Largest horizontal component of a direction that is nearly overhead. Sound that all
+# microphones have in common lifts the response there, so only its highest peak counts.
+_STEEP_LEVEL = 0.35
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,12 @@ class SteeredSearch:
     bins: slice
     """Bins of the spectra to use."""
     azimuth: NDArray[np.float64]
-    """(g,) azimuth of each position, rad. NaN for positions nearly overhead."""
+    """(g,) azimuth of each position, rad."""
     elevation: NDArray[np.float64]
     """(g,) elevation of each position, rad. NaN if the array cannot measure elevations.
     """
+    level: NDArray[np.float64]
+    """(g,) horizontal component of the direction of each position, 0 to 1."""
 
     @classmethod
     def of(
@@ -60,12 +64,11 @@ class SteeredSearch:
         range_m = np.where(grid.inverse_range > 0.0, np.linalg.norm(p, axis=1), 1.0)
         level = np.hypot(p[:, 0], p[:, 1])
         azimuth = np.arctan2(p[:, 1], p[:, 0])
-        azimuth[level < _LEAST_LEVEL * range_m] = np.nan
         elevation = np.full(len(p), np.nan)
         if "elevation" in shape.angles:
             elevation = np.arctan2(p[:, 2], level)
         bins = slice(math.ceil(low * window_s), math.floor(high * window_s) + 1)
-        return cls(shape, grid, bins, azimuth, elevation)
+        return cls(shape, grid, bins, azimuth, elevation, level / range_m)
 
     def votes(
         self, spectra: NDArray[np.complex64]
@@ -83,7 +86,9 @@ class SteeredSearch:
         share = cross.astype(np.complex64) / cross.shape[1]
         correlations = self.grid.correlations(share, self.bins)
         response = steered_response(correlations, self.grid).astype(np.float64)
-        response[np.isnan(self.azimuth)] = -1.0
+        steep = self.level < _STEEP_LEVEL
+        if "elevation" not in self.shape.angles or not steep[response.argmax()]:
+            response[steep] = -1.0
         # Overlapping frames count half, and so do their bins, because neither are
         # independent.
         values = 0.5 * cross.shape[1] * len(spectra) / 2.0
@@ -103,6 +108,8 @@ class SteeredSearch:
                 break
             off = self.azimuth - self.azimuth[best]
             near = np.cos(off) > math.cos(_APART_RAD)
+            if self.level[best] < _STEEP_LEVEL:
+                near |= self._apart(best) < 2.0 * _STEEP_LEVEL
             # If the response is higher just beyond the edge of a removed peak, it is
             # its slope, too.
             if found and response[near].max() > left[best]:
@@ -111,3 +118,8 @@ class SteeredSearch:
             found.append(best)
             left[near] = -1.0
         return np.array(found, dtype=np.int64)
+
+    def _apart(self, k: int) -> NDArray[np.float64]:
+        """Returns the horizontal distances of all directions from direction k."""
+        across = self.level * np.exp(1j * self.azimuth)
+        return np.asarray(np.abs(across - across[k]))

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.voting.direction_votes import DirectionVotes
+from analysis.arrays.voting.steep_votes import SteepVotes, steep_votes, without_steep
+from analysis.arrays.voting.vote_records import DirectionVotes
 
 _CELLS = 360
 
@@ -53,7 +54,23 @@ _LEAST_STEERED = 3
 _INDEPENDENT = 30.0
 _LEAST_STD_RAD = math.radians(0.5)
 
+# _RATES: rates of bearings to try, rad/s. Neighbors turn the votes of half a second by
+#   less than the width of the kernel.
+# _TURNS: least height of the highest peak at a rate, as a multiple of that at rest. Two
+#   sources at rest that sound one after the other reach 2.
+_RATES = np.radians(np.linspace(-120.0, 120.0, 17))
+_TURNS = 2.2
+
+# Standard deviation of Gaussian values over the median of their magnitudes.
+_MAD_TO_STD = 1.4826
+
 _STEPS = 4
+
+# _MOSTLY_STEADY: mean of how far the votes stand out from steady sound, below which
+#   steady sound such as that of a fan has most of the votes, though a talker may be
+#   louder.
+# _STEADY_WEIGHT: share of the weight that votes for steady sound then keep.
+_MOSTLY_STEADY, _STEADY_WEIGHT = 0.5, 0.1
 
 
 class VotedSource(NamedTuple):
@@ -66,53 +83,143 @@ class VotedSource(NamedTuple):
     votes count as independent."""
     elevation: float | None
     """Median elevation of the votes, rad. None if the array cannot measure it."""
+    elevation_std: float | None
+    """Scatter of the elevations of the votes, rad. Errors in common do not average out,
+    so it is that of one vote."""
     share: float
     """Share of the total weight of all votes, 0 to 1."""
+    power: float
+    """Sum of the A-weighted power of its votes."""
+    rises: float
+    """Mean of how far its votes stand out from steady sound, 0 to 1."""
     votes: int
     """Number of votes near the peak."""
     confidence: float
     """Confidence that the source exists, 0 to 1. It is 1 if the peak is the highest and
     has at least three times the required number of votes."""
+    rate: float = 0.0
+    """Rate of the bearing, rad/s. It is 0 unless the source turns fast."""
 
 
 def gather_sources(
-    votes: DirectionVotes, *, least_votes: float = _LEAST_VOTES
+    votes: DirectionVotes, *, least_votes: float = _LEAST_VOTES, by_level: bool = True
 ) -> list[VotedSource]:
     """Finds the sources in a span of time. The source with the largest share is first.
 
     If enough single frequencies vote, they decide together with the steered response.
     Otherwise, the steered response decides alone. Two steady sounds at the same time
     cannot be separated, because no time or frequency contains only one of them. For
-    less than one second of sound, ``least_votes`` must be smaller.
+    less than one second of sound, ``least_votes`` must be smaller. If ``by_level`` is
+    true and most votes are for steady sound, they count less than other votes.
     """
+    votes = _weighed(votes) if by_level else votes
     single = ~votes.steered
     enough = np.count_nonzero(single) >= least_votes
     use = single if enough else votes.steered
     least = least_votes if enough else _LEAST_STEERED
-    azimuth, weight = votes.azimuth[use], votes.weight[use]
-    if azimuth.size < least:
+    used, steered = votes.part(use, slice(0)), votes.part(votes.steered, slice(0))
+    if used.azimuth.size < least:
         return []
-    density, centers = _density(azimuth, weight)
-    if enough and np.count_nonzero(votes.steered) >= _LEAST_STEERED:
-        other, _ = _density(votes.azimuth[votes.steered], votes.weight[votes.steered])
-        density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
+    whole = float(used.weight.sum())
+    agree = enough and steered.azimuth.size >= _LEAST_STEERED
+    if agree:
         least *= _AGREED
     found = []
-    peaks = _peaks(density)
-    if not peaks.size:
-        return []
-    nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centers[peaks]), axis=1)]
-    for peak in peaks:
-        source = _source(
-            azimuth, votes.elevation[use], weight, centers[peak], nearest == peak
-        )
-        if source is not None and source.votes >= least:
-            height = float(density[peak] / density.max())
-            sure = min(1.0, source.votes / (3.0 * least))
-            found.append(source._replace(confidence=math.sqrt(height) * sure))
+    steep = steep_votes(used.azimuth, used.elevation, used.weight)
+    level = without_steep(used.elevation)
+    if steep is not None:
+        found = [_steep_source(used, steep, whole, least)]
+        level = ~steep.dropped
+    used = used.part(level, slice(0))
+    steered = steered.part(without_steep(steered.elevation), slice(0))
+    if used.azimuth.size:
+        found += _level_sources(used, steered if agree else None, whole, least)
+    found = [source for source in found if source.votes >= least]
     most = max((source.share for source in found), default=0.0)
     found = [source for source in found if source.share >= _LEAST_SHARE * most]
     return sorted(found, key=lambda source: -source.share)
+
+
+def gather_turning(
+    votes: DirectionVotes, t_s: float, *, least_votes: float
+) -> list[VotedSource]:
+    """Finds the sources in a short span of time with the middle t_s, at this middle.
+
+    While a source turns fast, its votes spread over many directions, and only parts of
+    them form peaks. If the votes agree far better when they are turned back by a common
+    rate, this is the rate of the sources.
+    """
+    single = ~votes.steered
+    use = single if np.count_nonzero(single) >= least_votes else votes.steered
+    if not use.any():
+        return []
+    after, weight = votes.t_s[use] - t_s, votes.weight[use]
+    heights = [
+        _density(wrapped(votes.azimuth[use] - rate * after), weight)[0].max()
+        for rate in _RATES
+    ]
+    best = int(np.argmax(heights))
+    rate = float(_RATES[best])
+    if heights[best] < _TURNS * heights[_RATES.size // 2]:
+        rate = 0.0
+    turned = votes._replace(azimuth=wrapped(votes.azimuth - rate * (votes.t_s - t_s)))
+    found = gather_sources(turned, least_votes=least_votes)
+    return [source._replace(rate=rate) for source in found]
+
+
+def _weighed(votes: DirectionVotes) -> DirectionVotes:
+    """Reduces the weights of votes for steady sound if most votes are for it."""
+    single = ~votes.steered if not votes.steered.all() else votes.steered
+    if not single.any() or votes.rises[single].mean() >= _MOSTLY_STEADY:
+        return votes
+    kept = _STEADY_WEIGHT + (1.0 - _STEADY_WEIGHT) * votes.rises
+    return votes._replace(weight=votes.weight * kept)
+
+
+def _steep_source(
+    votes: DirectionVotes, steep: SteepVotes, whole: float, least: float
+) -> VotedSource:
+    chosen = steep.chosen
+    count = int(np.count_nonzero(chosen))
+    std = steep.bearing_spread / math.sqrt(min(float(max(count, 1)), _INDEPENDENT))
+    share = float(votes.weight[chosen].sum()) / whole
+    sure = min(1.0, count / (3.0 * least))
+    return VotedSource(
+        bearing=steep.bearing,
+        bearing_std=math.hypot(
+            std, _LEAST_STD_RAD / max(math.cos(steep.elevation), 0.01)
+        ),
+        elevation=steep.elevation,
+        elevation_std=_scatter(votes.elevation[chosen]),
+        share=share,
+        power=float(votes.power[chosen].sum()),
+        rises=float(votes.rises[chosen].mean()),
+        votes=count,
+        confidence=math.sqrt(min(1.0, 2.0 * share)) * sure,
+    )
+
+
+def _level_sources(
+    votes: DirectionVotes, steered: DirectionVotes | None, whole: float, least: float
+) -> list[VotedSource]:
+    """Finds the sources that are not steep, from votes and from steered votes."""
+    azimuth, weight = votes.azimuth, votes.weight
+    density, centers = _density(azimuth, weight)
+    if steered is not None and steered.azimuth.size:
+        other, _ = _density(steered.azimuth, steered.weight)
+        density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
+    peaks = _peaks(density)
+    if not peaks.size:
+        return []
+    found = []
+    nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centers[peaks]), axis=1)]
+    for peak in peaks:
+        source = _source(votes, centers[peak], nearest == peak, whole)
+        if source is not None:
+            height = float(density[peak] / density.max())
+            sure = min(1.0, source.votes / (3.0 * least))
+            found.append(source._replace(confidence=math.sqrt(height) * sure))
+    return found
 
 
 def _density(
@@ -142,17 +249,17 @@ def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _source(
-    azimuth: NDArray[np.float64],
-    elevation: NDArray[np.float64],
-    weight: NDArray[np.float64],
+    votes: DirectionVotes,
     bearing: float,
     nearest: NDArray[np.bool_],
+    whole: float,
 ) -> VotedSource | None:
     """Makes the source at a peak from the votes that are nearest to this peak.
 
     The source is None if no vote is near the peak, for example if only the steered
     response has a peak there.
     """
+    azimuth, weight = votes.azimuth, votes.weight
     near = np.abs(wrapped(azimuth - bearing)) < _NEAR_RAD
     count = int(np.count_nonzero(near))
     mine = near & nearest
@@ -166,15 +273,24 @@ def _source(
     off = wrapped(a - bearing)
     spread = math.sqrt(float(w @ off**2) / float(w.sum()))
     std = spread / math.sqrt(min(float(a.size), _INDEPENDENT))
-    heights = elevation[mine]
+    heights = votes.elevation[mine]
+    measured = bool(np.isfinite(heights).all())
     return VotedSource(
         bearing=float(wrapped(bearing)),
         bearing_std=math.hypot(std, _LEAST_STD_RAD),
-        elevation=float(np.median(heights)) if np.isfinite(heights).all() else None,
-        share=float(w.sum() / weight.sum()),
+        elevation=float(np.median(heights)) if measured else None,
+        elevation_std=_scatter(heights) if measured else None,
+        share=float(w.sum()) / whole,
+        power=float(votes.power[mine].sum()),
+        rises=float(votes.rises[mine].mean()),
         votes=count,
         confidence=0.0,
     )
+
+
+def _scatter(angles: NDArray[np.float64]) -> float:
+    off = np.abs(angles - np.median(angles))
+    return max(_LEAST_STD_RAD, _MAD_TO_STD * float(np.median(off)))
 
 
 def wrapped(angle: Any) -> Any:

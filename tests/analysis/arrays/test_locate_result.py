@@ -10,8 +10,9 @@ import pytest
 
 from analysis.arrays.heard_sources import HeardSource, HeardSources
 from analysis.arrays.locate_plots import plot_locate, write_locate
-from analysis.arrays.locate_result import LocatedSource, SourceEstimate
+from analysis.arrays.locate_result import LocatedSource
 from analysis.arrays.locate_text import locate_text
+from analysis.arrays.source_estimate import SourceEstimate
 from systems.sound.array_shape import ArrayShape
 
 SQUARE = [[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]]
@@ -167,7 +168,7 @@ def talkers(*bearings, steady=False):
     """Sources at some bearings that are heard alike."""
     share = 1.0 / len(bearings)
     return HeardSources(
-        [HeardSource(b, 1.0, None, share, 1.0) for b in bearings], [], steady
+        [HeardSource(b, 1.0, None, None, share, 1.0) for b in bearings], [], steady
     )
 
 

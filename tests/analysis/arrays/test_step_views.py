@@ -12,7 +12,7 @@ import pytest
 from analysis.arrays.live_hearing import HeardStep
 from analysis.arrays.step_views import JsonLines, Screen, TextLines, view
 from analysis.arrays.voting.source_listener import TrackedSources
-from analysis.arrays.voting.source_tracks import SourceTrack
+from analysis.arrays.voting.track_state import SourceTrack
 
 
 def track(identity: int, bearing_deg: float, *, sounding: float = 0.9) -> SourceTrack:

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from analysis.arrays.voting.direction_votes import VotePlan, cast_votes, join_votes
+from analysis.arrays.voting.direction_votes import VotePlan, cast_votes
 from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_records import join_votes
 from studies.support.synthetic_speech import speech_like
 from systems.sound.array_shape import ArrayShape
 
@@ -145,3 +146,36 @@ def test_an_upright_row_has_no_bearings_to_vote_for():
     upright = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.1], [0.0, 0.0, 0.2]]
     with pytest.raises(ValueError, match=r"microphones: .* gives no bearings"):
         VotePlan.of(ArrayShape.of(upright), C, RATE)
+
+
+@pytest.mark.parametrize("elevation", [75.0, 82.0, -80.0, 89.0])
+def test_a_steep_talker_is_one_source(elevation):
+    places = TETRAHEDRON if elevation < 0.0 else SQUARE
+    samples = waves(places, talkers(1), [(50.0, elevation)])
+    (source,) = gather_sources(votes_of(places, samples))
+    off = math.degrees(source.bearing) - 50.0
+    assert abs(off) <= max(1.0, 3.0 * math.degrees(source.bearing_std))
+    assert math.degrees(source.elevation) == pytest.approx(elevation, abs=2.0)
+
+
+def test_few_phases_fit_if_the_channels_are_in_a_wrong_order():
+    samples = waves(SQUARE, talkers(1), [(70.0, 10.0)])
+    shares = []
+    for order in ([0, 1, 2, 3], [0, 2, 1, 3]):
+        waves_found, fitting = votes_of(SQUARE, samples[order]).group_fits.sum(axis=0)
+        shares.append(fitting / waves_found)
+    assert shares[0] > 0.75
+    assert shares[1] < 0.2
+
+
+def test_a_talker_has_more_weight_than_a_fan_that_sounds_all_the_time():
+    (voice,) = talkers(1, 3.0)
+    fan = np.random.default_rng(5).standard_normal(voice.size)
+    samples = waves(SQUARE, [voice, 0.35 * fan], [(0.0, 0.0), (120.0, 0.0)])
+    votes = votes_of(SQUARE, samples)
+    most = max(gather_sources(votes, by_level=False), key=lambda s: s.share)
+    assert math.degrees(most.bearing) == pytest.approx(120.0, abs=3.0)
+    first = gather_sources(votes)[0]
+    assert math.degrees(first.bearing) == pytest.approx(0.0, abs=3.0)
+    assert first.rises > 0.5
+    assert most.rises < 0.1

@@ -7,14 +7,25 @@ import math
 import numpy as np
 import pytest
 
-from analysis.arrays.voting.source_tracks import (
-    TrackMemory,
-    TrackParameters,
-    step_tracks,
-)
+from analysis.arrays.voting.source_tracks import TrackMemory, step_tracks
+from analysis.arrays.voting.track_state import TrackParameters
 from analysis.arrays.voting.vote_peaks import VotedSource
 
 STD = math.radians(2.0)
+
+
+def detected(bearing):
+    return VotedSource(
+        bearing=bearing,
+        bearing_std=STD,
+        elevation=None,
+        elevation_std=None,
+        share=1.0,
+        power=1.0,
+        rises=1.0,
+        votes=10,
+        confidence=1.0,
+    )
 
 
 def follow(ways, steps, step_s=0.1, seed=0):
@@ -26,7 +37,7 @@ def follow(ways, steps, step_s=0.1, seed=0):
         if len(at) == 2 and abs(at[0] - at[1]) < 12.0:
             at = [0.5 * (at[0] + at[1])]
         detections = [
-            VotedSource(bearing, STD, None, share=1.0, votes=10, confidence=1.0)
+            detected(bearing)
             for bearing in np.radians([a + 2.0 * rng.standard_normal() for a in at])
         ]
         tracks, memory = step_tracks(detections, t, memory, TrackParameters())
@@ -56,3 +67,31 @@ def test_time_must_run_forward():
     _, memory = step_tracks([], 1.0, TrackMemory(), TrackParameters())
     with pytest.raises(ValueError, match="before the last step"):
         step_tracks([], 0.5, memory, TrackParameters())
+
+
+def test_a_track_that_pauses_stays_near_where_it_was_heard():
+    """For 0.6 s, another talker pulls its detections by 10 deg/s before it pauses."""
+    memory, at = TrackMemory(), []
+    for k in range(40):
+        pulled = 10.0 * max(0.0, 0.1 * k - 1.4)
+        heard = [detected(math.radians(pulled))] if k < 20 else []
+        tracks, memory = step_tracks(heard, 0.1 * k, memory, TrackParameters())
+        at += [math.degrees(track.bearing) for track in tracks]
+    # With the rate that it had then, it would be 15 deg away after 1.5 s.
+    assert 0.0 < at[-1] - 6.0 < 12.0
+
+
+@pytest.mark.parametrize(("bearing", "identities"), [(3.0, {1}), (60.0, {1, 2})])
+def test_a_source_that_sounds_again_at_its_place_has_its_identity_back(
+    bearing, identities
+):
+    def way(t):
+        return 0.0 if t < 2.0 else bearing if t > 5.0 else None
+
+    told = follow([way], 80)
+    assert {t.identity for _, tracks in told for t in tracks} == identities
+
+
+def test_after_a_long_time_it_is_another_source():
+    told = follow([lambda t: 0.0 if t < 2.0 or t > 14.0 else None], 170)
+    assert {t.identity for _, tracks in told for t in tracks} == {1, 2}

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.arrays.voting.direction_votes import DirectionVotes
 from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_records import DirectionVotes
 
 
 def votes_at(single_deg, steered_deg):
@@ -19,9 +19,12 @@ def votes_at(single_deg, steered_deg):
         azimuth,
         np.full(count, np.nan),
         np.ones(count),
+        np.ones(count),
+        np.ones(count),
         np.arange(count) >= len(single_deg),
         np.empty(0),
         np.empty((0, 24)),
+        np.empty((0, 2)),
     )
 
 
