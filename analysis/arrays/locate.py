@@ -98,6 +98,7 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
         heard.faults,
         sources,
         known.largest_range_error,
+        recorded.remarks,
     )
 
 

@@ -109,6 +109,8 @@ class LocatedSource:
     """All sources in the recording, and their tracks."""
     largest_range_error: float = 0.2
     """Largest standard deviation of a reported range, as a share of the range."""
+    remarks: tuple[str, ...] = ()
+    """Messages about the files of the recording, for example that one is truncated."""
 
     def __repr__(self) -> str:
         heard = f"{len(self.estimates)} of {self.frames} stretches heard"
@@ -208,6 +210,7 @@ class LocatedSource:
             "summary": self.main_source(),
             "sources": [asdict(source) for source in self.heard.sources],
             "tracks": [asdict(track) for track in self.heard.tracks],
+            "remarks": list(self.remarks),
         }
 
 

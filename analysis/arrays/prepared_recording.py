@@ -67,7 +67,7 @@ def prepared_recording(
     band is at least 500 Hz wide. If the positions of the microphones are uncertain,
     delays cannot reveal exchanged channels or drifting clocks.
     """
-    samples, rate, where = recorded
+    samples, rate, where = recorded.samples, recorded.rate, recorded.name
     known = geometry.known
     shape = known.shape
     whole = geometry.columns == tuple(range(len(samples)))
