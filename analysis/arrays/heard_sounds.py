@@ -46,7 +46,7 @@ class HeardSound:
 
 
 def sightings_of(
-    recording: Recording,
+    files: Recording,
     geometry: ArrayGeometry,
     from_s: float = 0.0,
     to_s: float | None = None,
@@ -61,7 +61,7 @@ def sightings_of(
     wrong microphone positions. ``starts_s`` contains the beginnings of several files.
     The texts are messages about files and faulty channels.
     """
-    recorded = recorded_samples(recording, geometry, starts_s=starts_s)
+    recorded = recorded_samples(files, geometry, starts_s=starts_s)
     length, rate = recorded.samples.shape[1] / recorded.rate, recorded.rate
     end = length if to_s is None else to_s
     if not from_s < end <= length + 1.0 / rate:

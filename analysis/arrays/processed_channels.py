@@ -27,7 +27,8 @@ _FRAME_S, _LOWEST_HZ, _TOP_OF_RATE = 0.064, 300.0, 0.45
 # _MOST_LATE_S: longest delay of processing that is searched for, s.
 # _LATE_S: least delay beyond the travel time of sound along the array, s.
 # _LEAST_PEAK: least height of a peak, as a multiple of the correlation of noise.
-_MOST_LATE_S, _LATE_S, _LEAST_PEAK = 0.25, 2e-3, 10.0
+# _ABOVE_DIRECT: least height of a peak, as a multiple of that of direct sound.
+_MOST_LATE_S, _LATE_S, _LEAST_PEAK, _ABOVE_DIRECT = 0.25, 2e-3, 10.0, 3.0
 
 # A gain changes if its deviation over the frames is above both limits: dB, and a
 # multiple of the median deviation of the other channels.
@@ -130,11 +131,16 @@ def _lag(
     reach: int,
     most: int,
 ) -> int | None:
-    """Returns the delay of the first of two channels, if it is more than ``reach``."""
+    """Returns the delay of the first of two channels, if it is more than ``reach``.
+
+    An echo can be louder than the direct sound, but both are heard. Sound that comes
+    late has no peak within ``reach``.
+    """
     correlation = np.abs(fft.irfft(first * np.conj(second), size))
     lag = int(correlation[: most + 1].argmax())
     noise = float(np.median(correlation)) / 0.6745
-    clear = correlation[lag] > _LEAST_PEAK * noise
+    direct = max(correlation[: reach + 1].max(), correlation[-reach:].max())
+    clear = correlation[lag] > max(_LEAST_PEAK * noise, _ABOVE_DIRECT * direct)
     return lag if lag > reach and clear else None
 
 

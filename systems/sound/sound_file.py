@@ -267,7 +267,8 @@ def _read_all(
     Returns the samples, and whether there was no damage. Raises the error of libsndfile
     if no sample can be read.
     """
-    blocks, count, complete = [], 0, True
+    blocks: list[NDArray[np.float64]] = []
+    count, complete = 0, True
     while True:
         try:
             block = sound.read(_BLOCK, dtype="float64", always_2d=True)

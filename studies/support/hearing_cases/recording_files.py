@@ -97,7 +97,7 @@ def _wav(samples: NDArray[np.float64], rate: int, kind: str = "WAV") -> bytearra
     return bytearray(buffer.getvalue())
 
 
-def _written(folder: Path, name: str, content: bytes) -> Recording:
+def _written(folder: Path, name: str, content: bytes | bytearray) -> Recording:
     (folder / name).write_bytes(content)
     return folder / name
 
