@@ -185,8 +185,9 @@ def open_sound(
 ) -> tuple[SoundStream, ArrayGeometry]:
     """Opens a stream of sound, and loads the geometry of its array; see ``listen``."""
     from analysis.arrays.array_geometry import make_geometry
+    from analysis.arrays.flac_stream import open_flac
     from analysis.arrays.sound_card import open_card
-    from analysis.arrays.sound_pipe import open_flac, open_pipe
+    from analysis.arrays.sound_pipe import open_pipe
     from systems.framework.input_error import InputError
 
     known = make_geometry(geometry)

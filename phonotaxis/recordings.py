@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from numpy.typing import ArrayLike
-
 from analysis.arrays.array_geometry import ArrayGeometry, make_geometry
 from analysis.arrays.calibrate import CalibrationRun, calibrate as run_calibration
 from analysis.arrays.calibration_plots import plot_calibration
@@ -26,7 +24,11 @@ from analysis.arrays.locate import located
 from analysis.arrays.locate_plots import plot_locate, write_locate
 from analysis.arrays.locate_result import LocatedSource
 from analysis.arrays.locate_text import locate_text
-from analysis.arrays.recorded_samples import RecordedSamples, recorded_samples
+from analysis.arrays.recorded_samples import (
+    RecordedSamples,
+    Recording,
+    recorded_samples,
+)
 from phonotaxis.result import Prepared, Result, ignore
 
 if TYPE_CHECKING:
@@ -46,8 +48,8 @@ class LocateResult(LocatedSource, Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Faults of the channels."""
-        return tuple(fault.message for fault in self.faults)
+        """Messages about the files, and faults of the channels."""
+        return (*self.remarks, *(fault.message for fault in self.faults))
 
     def plot(self) -> Figure:
         """Draws the angles and the range over time, and the plan view."""
@@ -109,23 +111,28 @@ class CalibrationResult(Result):
 
 
 def locate(
-    recording: str | Path | ArrayLike,
+    recording: Recording,
     geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None = None,
     *,
     sample_rate_hz: float | None = None,
+    starts_s: Sequence[float] | None = None,
 ) -> LocateResult:
     """Locates the source of a recording in each short stretch of time.
 
     A warning of the logger ``phonotaxis``, and ``notes`` of the result, state each
-    fault of the channels.
+    fault of the files and of the channels.
 
     Args:
-        recording: WAV or FLAC file with one channel per microphone, at 8-192 kHz. Or
-            (n, samples) recorded samples, one row per microphone.
+        recording: WAV or FLAC file with one channel per microphone, at 8-192 kHz. Or a
+            list of files whose channels together are those of the microphones, in
+            their order. Or (n, samples) recorded samples, one row per microphone.
         geometry: Geometry of the microphones, the path of a geometry file, or a list of
             positions (x, y) or (x, y, z) in m. None: the robot's own array.
         sample_rate_hz: Rate of recorded samples, Hz. None for a file, which states its
             own rate.
+        starts_s: Time at which each of several files begins, s, from any common moment.
+            Only the time that all files cover is used, and times of the result count
+            from its beginning. None: all files begin at the same time.
 
     Returns:
         The estimates over time. Their standard deviations include the errors that the
@@ -137,7 +144,7 @@ def locate(
             remedy.
     """
     geometry = make_geometry(geometry)
-    recorded = recorded_samples(recording, geometry, sample_rate_hz)
+    recorded = recorded_samples(recording, geometry, sample_rate_hz, starts_s)
     return prepare_locate(recorded, geometry).run(ignore)
 
 

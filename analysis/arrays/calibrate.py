@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -87,11 +86,11 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
     """
     places = np.array(geometry.microphones)
     for k, listed in enumerate(sounds.sounds):
-        path = sounds.path_of(listed)
         if listed.position_m is not None:
             position = np.array(listed.position_m)
             check_position(places, position, f"sounds.{k}.position_m")
-        require_file(path, f"sounds.{k}.recording", "WAV or FLAC")
+        for path in sounds.paths_of(listed):
+            require_file(path, f"sounds.{k}.recording", "WAV or FLAC")
     top_hz = _top_hz(
         geometry, float(np.sqrt(np.mean(np.diag(geometry.known.budget.of_places))))
     )
@@ -116,7 +115,8 @@ def _pass(
     heard: list[HeardSound] = []
     remarks: list[str] = []
     for k, listed in enumerate(sounds.sounds):
-        name = f"sound {k + 1} ({Path(listed.recording).name})"
+        files = [path.name for path in sounds.paths_of(listed)]
+        name = f"sound {k + 1} ({files[0]}{', ...' if len(files) > 1 else ''})"
         found, said = _sightings(sounds, k, known, top_hz)
         remarks += [f"{name}: {remark}" for remark in said]
         if not found:
@@ -149,11 +149,12 @@ def _sightings(
     If the recording is silent there, the search uses all frequencies.
     """
     listed = sounds.sounds[k]
-    path, part = sounds.path_of(listed), (listed.from_s, listed.to_s)
+    files, starts_s = sounds.paths_of(listed), listed.starts_s
+    part = listed.from_s, listed.to_s
     try:
-        found, said = sightings_of(path, known, *part, top_hz)
+        found, said = sightings_of(files, known, *part, top_hz, starts_s)
         if not found and math.isfinite(top_hz):
-            found, said = sightings_of(path, known, *part)
+            found, said = sightings_of(files, known, *part, starts_s=starts_s)
     except InputError as error:
         raise InputError(f"sounds.{k}.{error.field}", error.message) from None
     return found, said

@@ -24,6 +24,9 @@ _NEAREST_M = 0.05
 # Largest distance of a source from a microphone, m.
 _FARTHEST_M = 1000.0
 
+_File = Annotated[str, Field(min_length=1)]
+_Files = Annotated[tuple[_File, ...], Strict(False), Field(min_length=1)]
+_Starts = Annotated[tuple[float, ...], Strict(False)]
 _Position = Annotated[
     tuple[float, ...], Strict(False), Field(min_length=2, max_length=3)
 ]
@@ -32,8 +35,11 @@ _Position = Annotated[
 class CalibrationSound(Parameters):
     """A recording, or part of a recording, of one source at rest."""
 
-    recording: str = Field(min_length=1)
-    """WAV or FLAC; a relative path begins in the folder of the list."""
+    recording: _File | _Files
+    """WAV or FLAC file, or one file per microphone; a relative path begins in the
+    folder of the list."""
+    starts_s: _Starts | None = None
+    """When each file of several begins, s; none: all begin at the same time."""
     position_m: _Position | None = None
     """Where the source is, in the frame of the geometry file, m; none: not known."""
     position_std_m: float = Field(default=0.01, ge=0.0, le=100.0)
@@ -63,9 +69,11 @@ class CalibrationSounds(Parameters):
     folder: str = "."
     """Where relative paths of recordings begin."""
 
-    def path_of(self, sound: CalibrationSound) -> Path:
-        """Path of a sound's recording."""
-        return Path(self.folder) / sound.recording
+    def paths_of(self, sound: CalibrationSound) -> list[Path]:
+        """Paths of the files of a sound's recording."""
+        files = sound.recording
+        files = (files,) if isinstance(files, str) else files
+        return [Path(self.folder) / file for file in files]
 
 
 def load_calibration_sounds(path: str | Path) -> CalibrationSounds:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from analysis.arrays.prepared_recording import (
     SNAPSHOTS,
     prepared_recording,
 )
-from analysis.arrays.recorded_samples import recorded_samples
+from analysis.arrays.recorded_samples import Recording, recorded_samples
 from analysis.arrays.recording_search import MAD_TO_STD, RecordingSearch, Sighting
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
@@ -47,20 +46,22 @@ class HeardSound:
 
 
 def sightings_of(
-    path: Path,
+    files: Recording,
     geometry: ArrayGeometry,
     from_s: float = 0.0,
     to_s: float | None = None,
     top_hz: float = math.inf,
+    starts_s: Sequence[float] | None = None,
 ) -> tuple[list[Sighting], list[str]]:
-    """Finds the stretches of a file in which a source is clearly audible.
+    """Finds the stretches of a recording in which a source is clearly audible.
 
     A stretch is a run of consecutive short windows, which are called snapshots. Only
     the part from ``from_s`` to ``to_s`` and only frequencies up to ``top_hz`` are used.
     At higher frequencies, the periods are shorter than the possible delay errors from
-    wrong microphone positions. The texts are messages about faulty channels.
+    wrong microphone positions. ``starts_s`` contains the beginnings of several files.
+    The texts are messages about files and faulty channels.
     """
-    recorded = recorded_samples(path, geometry)
+    recorded = recorded_samples(files, geometry, starts_s=starts_s)
     length, rate = recorded.samples.shape[1] / recorded.rate, recorded.rate
     end = length if to_s is None else to_s
     if not from_s < end <= length + 1.0 / rate:
@@ -83,7 +84,7 @@ def sightings_of(
         found = max(found, heard, key=len)
         if len(found) >= min(LEAST_SIGHTINGS, len(search.stretches)):
             break
-    return found, [fault.message for fault in faults]
+    return found, [*recorded.remarks, *(fault.message for fault in faults)]
 
 
 def heard_sound(

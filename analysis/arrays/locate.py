@@ -105,6 +105,7 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
         heard.faults,
         replace(sources, sources=[_with_errors(s, known) for s in sources.sources]),
         known.largest_range_error,
+        recorded.remarks,
     )
 
 

@@ -36,6 +36,8 @@ class LocatedSource:
     """Sources and tracks of the votes."""
     largest_range_error: float = 0.2
     """Largest standard deviation of a reported range, as a share of the range."""
+    remarks: tuple[str, ...] = ()
+    """Messages about the files of the recording, for example that one is truncated."""
 
     def __repr__(self) -> str:
         heard = f"{len(self.estimates)} of {self.frames} stretches heard"
@@ -139,4 +141,5 @@ class LocatedSource:
             "summary": self.main_source(),
             "sources": [asdict(source) for source in self.agreed.sources],
             "tracks": [asdict(track) for track in self.agreed.tracks],
+            "remarks": list(self.remarks),
         }

@@ -17,6 +17,7 @@ from analysis.arrays.array_geometry import (
 from analysis.arrays.channel_faults import ChannelFault, find_channel_faults
 from analysis.arrays.clock_drift import recording_drift
 from analysis.arrays.frame_delays import exchanged
+from analysis.arrays.processed_channels import processed_channel
 from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.recording_search import RecordingSearch
 from analysis.arrays.recording_spectra import RecordingSpectra
@@ -67,7 +68,7 @@ def prepared_recording(
     band is at least 500 Hz wide. If the positions of the microphones are uncertain,
     delays cannot reveal exchanged channels or drifting clocks.
     """
-    samples, rate, where = recorded
+    samples, rate, where = recorded.samples, recorded.rate, recorded.name
     known = geometry.known
     shape = known.shape
     whole = geometry.columns == tuple(range(len(samples)))
@@ -85,6 +86,9 @@ def prepared_recording(
         search = RecordingSearch(spectra(channels), shape, known.c, SNAPSHOTS[0])
         return search.mean_response()
 
+    processed = processed_channel(samples, geometry.columns, shape, known.c, rate)
+    if processed is not None:
+        raise InputError("recording", f"{where}: {_not_of_a_microphone(*processed)}")
     drift = None
     if trusts_positions:
         drift = recording_drift(channels, float(rate), shape.p_AM, known.c)
@@ -106,6 +110,14 @@ def prepared_recording(
             f"{recording.window.size}; record longer",
         )
     return recording, faults
+
+
+def _not_of_a_microphone(channel: int, observation: str) -> str:
+    return (
+        f"channel {channel + 1}: processed, because it {observation}; name the columns "
+        "of the microphones in 'channels' ([1, 2, 3, 4] for a ReSpeaker with six "
+        "channels)"
+    )
 
 
 def channels_without_faults(

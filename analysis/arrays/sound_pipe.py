@@ -1,6 +1,6 @@
 """Reads a stream of sound from a pipe or a file.
 
-The sound is WAV, FLAC, or raw samples. Raw samples are interleaved: one sample of each
+The sound is WAV or raw samples. Raw samples are interleaved: one sample of each
 channel in turn.
 """
 
@@ -13,11 +13,9 @@ import struct
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
-from pathlib import Path
 from typing import BinaryIO, Literal, NamedTuple
 
 import numpy as np
-import soundfile
 from numpy.typing import NDArray
 
 from analysis.arrays.sound_stream import (
@@ -28,8 +26,11 @@ from analysis.arrays.sound_stream import (
     SoundBlock,
     SoundStream,
     StreamBrokenError,
+    check_stated,
+    truncated_fault,
 )
 from systems.framework.input_error import InputError
+from systems.sound.wav_lengths import states_length
 
 SampleFormat = Literal["s16le", "s24le", "s32le", "f32le"]
 
@@ -45,10 +46,6 @@ _FORMATS: dict[SampleFormat, tuple[int, str, float]] = {
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
 _MOST_HEADER, _MOST_CHUNKS = 2**16, 64
-
-# Least length in a WAV header that means an unknown length. Recorders that write to a
-# pipe state 0, or a value near the limit of a signed or unsigned number.
-_UNKNOWN = 0x7FFF_0000
 
 # _BEGIN: first bytes of a further WAV in the stream.
 # _BEGIN_SIZE: number of these bytes.
@@ -107,7 +104,7 @@ def open_pipe(
             raw = _Format(channels or raw_channels, sample_rate_hz, sample_format)
         form, length = _begin(source, raw)
         if form is not raw:
-            _check_stated(form.channels, form.sample_rate_hz, channels, sample_rate_hz)
+            check_stated(form.channels, form.sample_rate_hz, channels, sample_rate_hz)
         stack.pop_all()
     blocks = _blocks(source, form, length)
     return SoundStream(form.channels, form.sample_rate_hz, blocks, pipe.close)
@@ -143,6 +140,8 @@ class _Source:
         self._descriptor = pipe.fileno()
         self._unread = b""
         self.waited_s = 0.0
+        self.missing = 0
+        """Bytes that a WAV header states beyond the end of the input."""
 
     def unread(self, data: bytes) -> None:
         """Puts bytes back, so that they are read next."""
@@ -171,48 +170,6 @@ class _Source:
                 break
             data += more or b""
         return data
-
-
-def open_flac(
-    path: Path, *, channels: int | None = None, sample_rate_hz: int | None = None
-) -> SoundStream:
-    """Opens a stream from a FLAC file.
-
-    Raises ``InputError`` if the file cannot be decoded or contradicts the stated
-    values.
-    """
-    try:
-        sound = soundfile.SoundFile(path)
-    except soundfile.SoundFileError as error:
-        raise InputError(
-            "input", f"cannot be decoded ({error}); record it again"
-        ) from None
-    with ExitStack() as stack:
-        stack.callback(sound.close)
-        _check_stated(sound.channels, sound.samplerate, channels, sample_rate_hz)
-        stack.pop_all()
-    size = round(BLOCK_S * sound.samplerate)
-
-    def blocks() -> Iterator[SoundBlock]:
-        while len(samples := sound.read(size, dtype="float32", always_2d=True)):
-            yield SoundBlock(samples.T)
-
-    return SoundStream(sound.channels, sound.samplerate, blocks(), sound.close)
-
-
-def _check_stated(
-    channels: int, rate: int, stated_channels: int | None, stated_rate: int | None
-) -> None:
-    if stated_rate not in (None, rate):
-        raise InputError(
-            "--rate",
-            f"is {stated_rate} Hz, but the file states {rate} Hz; leave it out",
-        )
-    if stated_channels not in (None, channels):
-        raise InputError(
-            "--channels",
-            f"is {stated_channels}, but the file has {channels}; leave it out",
-        )
 
 
 def _wav_header(source: _Source) -> tuple[_Format, int | None]:
@@ -254,7 +211,7 @@ def _wav_header(source: _Source) -> tuple[_Format, int | None]:
             "it to 16, 24 or 32 bits",
         )
     form = _Format(channels, rate, formats[kind, bits])
-    return form, size if 0 < size < _UNKNOWN else None
+    return form, size if states_length(size) else None
 
 
 def _exactly(source: _Source, size: int) -> bytes:
@@ -283,9 +240,14 @@ def _blocks(source: _Source, form: _Format, length: int | None) -> Iterator[Soun
         source.waited_s = 0.0
         yield SoundBlock(_samples(whole, form), faults, gap)
         gap = False
+    last: tuple[str, ...] = ()
     if cut:
-        fault = "the stream ended within a sample of all channels"
-        yield SoundBlock(_samples(b"", form), (fault,))
+        last += ("the stream ended within a sample of all channels",)
+    if source.missing >= form.width:
+        missing = source.missing // form.width
+        last += (truncated_fault(missing, form.sample_rate_hz),)
+    if last:
+        yield SoundBlock(_samples(b"", form), last)
 
 
 def _chunks(
@@ -302,6 +264,7 @@ def _chunks(
         while len(data) < size:
             more = source.some(size - len(data))
             if more == b"":
+                source.missing = 0 if length is None else length - len(data)
                 if data:
                     yield data
                 return

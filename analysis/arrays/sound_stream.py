@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from systems.framework.input_error import InputError
+
 #: Length of a block, s. It is short compared with a step of the listener.
 BLOCK_S = 0.02
 
@@ -102,3 +104,33 @@ class Pace:
             "wrong, which makes all bearings wrong; check --rate and the recorder"
         )
         return (fault,)
+
+
+def check_stated(
+    channels: int, rate: int, stated_channels: int | None, stated_rate: int | None
+) -> None:
+    """Checks the number of channels and the rate of a file against stated values.
+
+    Raises ``InputError`` if a stated value is neither None nor that of the file.
+    """
+    if stated_rate not in (None, rate):
+        raise InputError(
+            "--rate",
+            f"is {stated_rate} Hz, but the file states {rate} Hz; leave it out",
+        )
+    if stated_channels not in (None, channels):
+        raise InputError(
+            "--channels",
+            f"is {stated_channels}, but the file has {channels}; leave it out",
+        )
+
+
+def truncated_fault(missing: int, sample_rate_hz: int) -> str:
+    """Describes that a stream ended before the end that its header states.
+
+    ``missing`` is the number of samples per channel that are missing.
+    """
+    return (
+        f"the file is truncated: it ends {missing / sample_rate_hz:.3g} s before the "
+        "end that its header states; record or copy it again"
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import say, take_json
+from phonotaxis.commands.arguments import completed_by, say, take_json
 from phonotaxis.commands.command import Command, Take
 
 if TYPE_CHECKING:
@@ -14,7 +14,18 @@ if TYPE_CHECKING:
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("recording", metavar="FILE", help="multi-channel WAV or FLAC")
+    recording = parser.add_argument(
+        "recording",
+        nargs="+",
+        metavar="FILE",
+        help="multi-channel WAV or FLAC, or one file per microphone in their order",
+    )
+    completed_by(recording, "file")
+    parser.add_argument(
+        "--starts-s",
+        metavar="S,S,...",
+        help="time at which each of several files begins, s (default: all at once)",
+    )
     parser.add_argument(
         "--geometry", metavar="FILE.yaml", help="positions of the microphones"
     )
@@ -26,17 +37,31 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Prepared[LocateResult]:
     from analysis.arrays.array_geometry import make_geometry
-    from analysis.arrays.recorded_samples import recorded_samples
+    from analysis.arrays.recorded_samples import name_of_files, recorded_samples
 
     geometry = make_geometry(options.geometry)
-    recorded = recorded_samples(options.recording, geometry)
+    starts_s = None if options.starts_s is None else _times(options.starts_s)
+    recorded = recorded_samples(options.recording, geometry, starts_s=starts_s)
     if options.out is not None:
         take(options.out)
-    say(f"locating sources in {options.recording}")
+    say(f"locating sources in {name_of_files(options.recording)}")
 
     from phonotaxis.recordings import prepare_locate
 
     return prepare_locate(recorded, geometry)
+
+
+def _times(text: str) -> list[float]:
+    """Reads numbers that are separated by commas."""
+    from systems.framework.input_error import InputError
+
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(
+            "--starts-s",
+            f"is {text!r}; give one number per file, for example 0,0.12,0.05",
+        ) from None
 
 
 COMMAND = Command(
@@ -48,5 +73,6 @@ COMMAND = Command(
     examples=(
         "locate recording.wav --geometry array.yaml",
         "locate recording.wav --out results/located --json",
+        "locate mic1.wav mic2.wav mic3.wav --starts-s 0,0.12,0.05",
     ),
 )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import re
 import struct
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import NamedTuple
 
 import numpy as np
 import soundfile
@@ -13,13 +15,28 @@ from numpy.typing import NDArray
 
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
+from systems.sound.wav_lengths import (
+    LEAST_UNKNOWN,
+    MOST_UNKNOWN,
+    data_size,
+    states_length,
+)
 
-# Numbers that stand for an unknown length of a WAV file. Programs that write to a pipe
-# do not know the length of the file, and write one of these numbers instead.
-_UNKNOWN_SIZES = (0, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
+# Lines in which libsndfile reports that a file is shorter than its header states. AIFF
+# has the name SSND, AU the name Data Size, and W64 and RF64 have names with riff.
+_SHORTER = re.compile(
+    r"^\s*(?:data|SSND|Data Size|riff|Riff size)\s*: (\d+) \(should be (\d+)\)",
+    re.MULTILINE,
+)
 
-# Number of frames that libsndfile reports for a FLAC file of unknown length.
-_UNKNOWN_FRAMES = 2**63 - 1
+# First bytes of sound files with a header.
+_HEADERS = (
+    *(b"RIFF", b"RIFX", b"RF64", b"riff", b"fLaC", b"OggS", b"FORM", b".snd", b"caff"),
+    b"ID3",
+)
+
+#: Number of frames that libsndfile reports for a FLAC file of unknown length.
+UNKNOWN_FRAMES = 2**63 - 1
 
 #: Largest number of samples in all channels together. That many samples need 1 GB.
 MOST_SAMPLES = 2**27
@@ -33,12 +50,25 @@ _MOST_BYTES = 8
 # Smallest and largest sample rate.
 _RATES_HZ = (1_000, 400_000)
 
-# Number of samples per channel that are read at once.
-_BLOCK = 2**16
+# Number of samples per channel that are read at once. The samples before damage in a
+# file are read except for those in the damaged block.
+_BLOCK = 2**12
+
+
+class ReadSound(NamedTuple):
+    """The samples of a sound file, which may end early."""
+
+    samples: NDArray[np.float64]
+    """(channels, n) samples; full scale is 1."""
+    rate: int
+    """Sample rate, Hz."""
+    truncated: str = ""
+    """How much of the file is missing, after the name of the file. Empty if the file is
+    complete."""
 
 
 def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
-    """Reads a WAV or FLAC file, even if its header does not state the length.
+    """Reads a complete WAV or FLAC file, even if its header does not state the length.
 
     Args:
         path: Sound file.
@@ -48,9 +78,28 @@ def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
         (channels, n) samples, where 1 is full scale, and the sample rate in Hz.
 
     Raises:
-        InputError: The file is missing, not a sound file, empty, truncated, or silent
-            in every channel. Or a sample is not finite, the file has more than
-            ``MOST_SAMPLES`` samples, or its rate is outside 1 to 400 kHz.
+        InputError: ``read_recording`` refuses the file, or the file is truncated.
+    """
+    samples, rate, truncated = read_recording(path, field)
+    if truncated:
+        raise InputError(field, f"{truncated}; record or copy it again")
+    return samples, rate
+
+
+def read_recording(path: str | Path, field: str) -> ReadSound:
+    """Reads a WAV or FLAC file up to its end, or up to damage in it.
+
+    Args:
+        path: Sound file.
+        field: Name of the parameter with the path, for the messages.
+
+    Returns:
+        The samples that can be read, the sample rate, and what is missing.
+
+    Raises:
+        InputError: The file is missing, not a sound file, empty, or silent in every
+            channel. Or a sample is not finite, the file has more than ``MOST_SAMPLES``
+            samples, or its rate is outside 1 to 400 kHz.
     """
     path = require_file(path, field, "WAV or FLAC")
     where = repr(str(path))
@@ -58,21 +107,29 @@ def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
         raise InputError(field, f"{where} is empty; record or copy it again")
     try:
         with _Stream(_opened(path, field, where)) as sound:
-            announced, rate = sound.frames, sound.samplerate
+            # Raw samples can look like the frames of an MP3 file.
+            if sound.format == "MP3" and path.suffix.lower() != ".mp3":
+                _require_header(path, field, where)
+            announced, rate = _announced_frames(sound), sound.samplerate
             _check_header(announced, sound.channels, rate, field, where)
-            samples = _read_all(sound, field, where)
-    except (soundfile.LibsndfileError, OSError) as error:
+            samples, complete = _read_all(sound, field, where)
+    except OSError as error:
         raise InputError(
-            field, f"{where} is not a readable WAV or FLAC file ({error}); convert it"
+            field, f"{where} cannot be read ({error}); copy it to another place"
         ) from error
-    if samples.shape[1] < announced != _UNKNOWN_FRAMES:
+    except soundfile.LibsndfileError as error:
+        _require_header(path, field, where)
+        cause = error.error_string.rstrip(". ") or "it is damaged"
         raise InputError(
-            field,
-            f"{where} is truncated: {samples.shape[1]} of {announced} samples; "
-            "record or copy it again",
-        )
+            field, f"{where} is not a readable WAV or FLAC file ({cause}); convert it"
+        ) from error
     _check_samples(samples, field, where)
-    return samples, rate
+    count, truncated = samples.shape[1], ""
+    if announced == UNKNOWN_FRAMES and not complete:
+        truncated = f"{where} is truncated: only {count} samples can be read"
+    elif count < announced != UNKNOWN_FRAMES:
+        truncated = f"{where} is truncated: {count} of {announced} samples can be read"
+    return ReadSound(samples, rate, truncated)
 
 
 def read_played(
@@ -160,7 +217,7 @@ def _check_header(
             f"{where} has a sample rate of {rate} Hz; record at {_RATES_HZ[0]} to "
             f"{_RATES_HZ[1]} Hz",
         )
-    if frames != _UNKNOWN_FRAMES and frames * channels > MOST_SAMPLES:
+    if frames != UNKNOWN_FRAMES and frames * channels > MOST_SAMPLES:
         raise InputError(
             field,
             f"{where} states that it holds {frames} samples of {channels} "
@@ -177,12 +234,51 @@ def _too_long(field: str, where: str) -> InputError:
     )
 
 
+def _announced_frames(sound: soundfile.SoundFile) -> int:
+    """Returns the number of samples per channel that the header of a file states.
+
+    For a truncated file of samples without compression, ``frames`` is the number of
+    samples in the file, and only the log of libsndfile has the stated length.
+    """
+    for stated, found in _SHORTER.findall(sound.extra_info):
+        if int(found) < int(stated) < LEAST_UNKNOWN and sound.frames:
+            return int(stated) // (int(found) // sound.frames)
+    return int(sound.frames)
+
+
+def _require_header(path: Path, field: str, where: str) -> None:
+    """Raises an InputError if a file does not begin like a sound file."""
+    with path.open("rb") as file:
+        if file.read(4).startswith(_HEADERS):
+            return
+    raise InputError(
+        field,
+        f"{where} is not a readable WAV or FLAC file, it has no header; convert it, "
+        "for example raw samples of 16 bits: ffmpeg -f s16le -ar RATE -ac CHANNELS -i "
+        "FILE FILE.wav",
+    )
+
+
 def _read_all(
     sound: soundfile.SoundFile, field: str, where: str
-) -> NDArray[np.float64]:
-    """Reads all samples as an array (channels, samples)."""
-    blocks, count = [], 0
-    while len(block := sound.read(_BLOCK, dtype="float64", always_2d=True)):
+) -> tuple[NDArray[np.float64], bool]:
+    """Reads samples as an array (channels, samples) up to the end or to damage.
+
+    Returns the samples, and whether there was no damage. Raises the error of libsndfile
+    if no sample can be read.
+    """
+    blocks: list[NDArray[np.float64]] = []
+    count, complete = 0, True
+    while True:
+        try:
+            block = sound.read(_BLOCK, dtype="float64", always_2d=True)
+        except soundfile.LibsndfileError:
+            if not blocks:
+                raise
+            complete = False
+            break
+        if not len(block):
+            break
         blocks.append(block)
         count += len(block)
         if count * sound.channels > MOST_SAMPLES:
@@ -192,7 +288,7 @@ def _read_all(
     for block in blocks:
         samples[:, first : first + len(block)] = block.T
         first += len(block)
-    return samples
+    return samples, complete
 
 
 def _check_samples(samples: NDArray[np.float64], field: str, where: str) -> None:
@@ -209,45 +305,30 @@ def _check_samples(samples: NDArray[np.float64], field: str, where: str) -> None
         raise InputError(field, f"{where} is silent throughout; use a file with sound")
 
 
-def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
-    """Returns the path of a file, or a copy of the file with a repaired header.
+def _opened(path: Path, field: str, where: str) -> int | BytesIO:
+    """Opens a file, or a copy of the file with a repaired header.
 
-    The library libsndfile reads a truncated WAV file without an error message, so this
-    function refuses such a file. If a recorder left 0 as the length of the samples,
-    libsndfile would read nothing. In this case, the function returns a copy whose
-    header marks the length as unknown.
+    If a recorder left 0 as the length of the samples, libsndfile would read nothing. In
+    this case, the function returns a copy whose header marks the length as unknown.
+    Otherwise, it returns a descriptor, which the reader closes. A descriptor has no
+    name, so a file named .raw may have a header.
     """
     file_size = path.stat().st_size
     with path.open("rb") as file:
         header = file.read(12)
-        if header[:4] != b"RIFF":
-            return path
-        size = _data_size(file) if len(header) == 12 else None
+        size = data_size(file) if header[:4] == b"RIFF" else -1
         begins = file.tell()
-        if size is None or (size not in _UNKNOWN_SIZES and begins + size > file_size):
-            raise InputError(field, f"{where} is truncated; record or copy it again")
-        (whole,) = struct.unpack("<I", header[4:8])
-        # The header is complete if the length is not 0, or if other chunks follow the
-        # samples.
-        if size or (whole not in _UNKNOWN_SIZES and 8 + whole > begins):
-            return path
+        if size is None:
+            raise InputError(
+                field, f"{where} is truncated in its header; record or copy it again"
+            )
+        whole = struct.unpack("<I", header[4:8])[0] if size == 0 else 0
+        # If other chunks follow the samples, the file is complete and has no samples.
+        if size != 0 or (states_length(whole) and 8 + whole > begins):
+            return os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
         if file_size - begins > _MOST_BYTES * MOST_SAMPLES:
             raise _too_long(field, where)
         file.seek(0)
         content = bytearray(file.read())
-    content[begins - 4 : begins] = struct.pack("<I", _UNKNOWN_SIZES[-1])
+    content[begins - 4 : begins] = struct.pack("<I", MOST_UNKNOWN)
     return BytesIO(content)
-
-
-def _data_size(file: BinaryIO) -> int | None:
-    """Returns the size of the samples of a WAV file that its header states, in bytes.
-
-    The result is None if the file has no chunk of samples. Afterwards, the position in
-    the file is the beginning of the samples.
-    """
-    while len(chunk := file.read(8)) == 8:
-        name, size = struct.unpack("<4sI", chunk)
-        if name == b"data":
-            return int(size)
-        file.seek(size + size % 2, 1)
-    return None

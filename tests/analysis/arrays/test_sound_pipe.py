@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.arrays.sound_pipe import open_flac, open_pipe
-from analysis.arrays.sound_stream import STOPPED, Pace, StreamBrokenError
+from analysis.arrays.flac_stream import open_flac
+from analysis.arrays.sound_pipe import open_pipe
+from analysis.arrays.sound_stream import (
+    STOPPED,
+    Pace,
+    StreamBrokenError,
+    truncated_fault,
+)
 from systems.framework.input_error import InputError
 from tests.analysis.arrays.plane_waves import RATE, wav_bytes
 
@@ -82,6 +88,26 @@ def test_flac_is_read_by_its_name_and_refused_in_a_pipe(tmp_path):
     np.testing.assert_array_equal(samples, SAMPLES)
     with pytest.raises(InputError, match="FLAC; name the file, or decode it: flac"):
         open_pipe(path.open("rb"), raw_channels=4)
+
+
+def test_a_truncated_file_is_named(tmp_path):
+    data = wav_bytes(SAMPLES)
+    samples, faults = heard(stream_of(tmp_path, data[: len(data) // 2]))
+    np.testing.assert_array_equal(samples, SAMPLES[:, : samples.shape[1]])
+    left_s = (SAMPLES.shape[1] - samples.shape[1]) / RATE
+    assert f"truncated: it ends {left_s:.3g} s before" in faults[-1]
+
+
+def test_a_truncated_flac_file_is_named(tmp_path):
+    path = tmp_path / "sound.flac"
+    soundfile.write(path, np.tile(SAMPLES, 30).T, RATE)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) * 2 // 3])
+    samples, faults = heard(open_flac(path))
+    assert 12_000 < samples.shape[1] <= 20_000
+    left_s = (30_000 - samples.shape[1]) / RATE
+    assert faults == [truncated_fault(30_000 - samples.shape[1], RATE)]
+    assert f"{left_s:.3g} s before" in faults[0]
 
 
 def test_what_follows_the_samples_is_no_sound(tmp_path):

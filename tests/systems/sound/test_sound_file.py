@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import soundfile
 
-from systems.sound.sound_file import read_sound
+from systems.framework.input_error import LONGEST_MESSAGE
+from systems.sound.sound_file import read_recording, read_sound
 
 TWO = np.stack([np.linspace(-0.5, 0.5, 400), np.linspace(0.25, 0.0, 400)])
 
@@ -77,6 +80,71 @@ def test_every_fault_is_named(tmp_path):
         assert "\n" not in message
 
 
+@pytest.mark.parametrize(
+    ("name", "subtype"),
+    [
+        ("a.wav", "PCM_16"),
+        ("a.wav", "PCM_24"),
+        ("a.wav", "FLOAT"),
+        ("a.aiff", "PCM_16"),
+        ("a.au", "PCM_16"),
+        ("a.w64", "PCM_16"),
+        ("a.rf64", "PCM_16"),
+    ],
+)
+@pytest.mark.parametrize("share", [0.3, 0.66, 0.98])
+def test_samples_before_the_end_of_a_truncated_file(tmp_path, name, subtype, share):
+    rng = np.random.default_rng(1)
+    whole = rng.uniform(-0.9, 0.9, (3, 9_000))
+    path = tmp_path / name
+    kind = "RF64" if name == "a.rf64" else None
+    soundfile.write(path, whole.T, 44_100, subtype=subtype, format=kind)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    samples, rate, truncated = read_recording(path, "recording")
+    count = samples.shape[1]
+    assert rate == 44_100
+    assert count == pytest.approx(share * 9_000, abs=60)
+    np.testing.assert_allclose(samples, whole[:, :count], atol=1e-4)
+    said, of = re.search(r"truncated: (\d+) of (\d+) samples", truncated).groups()
+    assert (int(said), int(of)) == (count, pytest.approx(9_000, abs=60))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.66, 0.98])
+@pytest.mark.parametrize("stated", [60_000, 0])
+def test_samples_before_the_end_of_a_truncated_flac(tmp_path, share, stated):
+    """Blocks of FLAC are whole or not at all."""
+    rng = np.random.default_rng(1)
+    whole = np.rint(2.0**15 * rng.uniform(-0.9, 0.9, (2, 60_000))) / 2.0**15
+    path = tmp_path / "a.flac"
+    soundfile.write(path, whole.T, 44_100, subtype="PCM_16")
+    content = bytearray(path.read_bytes())
+    content[18:26] = (44_100 << 44 | 1 << 41 | 15 << 36 | stated).to_bytes(8, "big")
+    path.write_bytes(content[: int(share * len(content))])
+    samples, _, truncated = read_recording(path, "recording")
+    count = samples.shape[1]
+    assert share * 60_000 - 8_192 < count <= share * 60_000
+    np.testing.assert_array_equal(samples, whole[:, :count])
+    says = f"{count} of 60000" if stated else f"only {count} samples"
+    assert f"truncated: {says}" in truncated
+
+
+@pytest.mark.parametrize("name", ["a.raw", "a.RAW", "a.pcm", "a.bin", "a"])
+def test_samples_without_a_header(tmp_path, name):
+    path = tmp_path / name
+    content = np.random.default_rng(1).integers(0, 256, 4_000, np.uint8).tobytes()
+    for begin in (b"", b"\xff\xff" * 5, b"\xff\xfb\x90\x64", bytes(40)):
+        path.write_bytes(begin + content)
+        with pytest.raises(ValueError, match=r"raw samples.*ffmpeg -f s16le") as caught:
+            read_sound(path, "sound.file")
+        assert len(str(caught.value)) < LONGEST_MESSAGE
+
+
+def test_a_name_of_raw_samples_for_a_file_with_a_header(tmp_path):
+    wav(tmp_path / "a.wav").rename(tmp_path / "a.raw")
+    np.testing.assert_allclose(read_sound(tmp_path / "a.raw", "f")[0], TWO, atol=1e-6)
+
+
 def test_length_that_a_pipe_left_unknown(tmp_path):
     """Recorders that write to a pipe leave 0xFFFFFFFF as the length."""
     content = bytearray(wav(tmp_path / "a.wav", subtype="PCM_16").read_bytes())
@@ -132,7 +200,9 @@ def test_a_file_beyond_the_limit(tmp_path, monkeypatch, frames):
     assert read_sound(path, "sound.file")[0].shape == (2, 400)
 
 
-@pytest.mark.parametrize("unknown", [0, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF])
+@pytest.mark.parametrize(
+    "unknown", [0, 0x7FFF_0000, 0x7FFFF000, 0x7FFFF024, 0x7FFFFFFF, 2**31, 2**32 - 1]
+)
 @pytest.mark.parametrize("before", [b"", b"LIST\x06\0\0\0INFO\0\0"])
 def test_sizes_that_a_stream_left_unknown(tmp_path, unknown, before):
     content = wav(tmp_path / "a.wav", subtype="PCM_16").read_bytes()
