@@ -21,7 +21,7 @@ from systems.sound.array_shape import ArrayShape
 
 # Largest distance between two microphones, m. Larger distances mean that the positions
 # are not in meters.
-_LARGEST_M = 30.0
+_LARGEST_M = 5_000.0
 
 # Largest number of microphones. The computing time grows with the number of pairs.
 _MOST_MICROPHONES = 64

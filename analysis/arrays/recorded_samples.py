@@ -13,7 +13,7 @@ from analysis.arrays.array_geometry import ROBOT_ARRAY, ArrayGeometry
 from systems.framework.input_error import InputError
 from systems.sound.sound_file import read_sound
 
-_RATES_HZ = (8_000, 192_000)
+_RATES_HZ = (8_000, 500_000)
 
 
 class RecordedSamples(NamedTuple):

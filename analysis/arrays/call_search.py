@@ -1,0 +1,262 @@
+"""Searches the delays of single calls at recorders that are far apart.
+
+Sound takes longer from one recorder to the next than a call lasts. No window then
+contains the same sound in all channels, and the grid of positions would have too many
+points. Instead, the search finds a call in the channel in which it is clearest, and
+looks for the same call in all other channels, as far as the sound can travel. The call
+need not be audible at all recorders.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from analysis.arrays.aligned_delays import fit_aligned_delays
+from analysis.arrays.recording_search import Sighting
+from analysis.arrays.standing_sounds import StandingSound, standing_sound
+from systems.delays.correlations import correlations_at_lags
+from systems.delays.delay_sets import consistent_lags
+from systems.sound.array_shape import ArrayShape
+
+# _PAUSE_S: a longer pause separates two calls, s.
+# _LONGEST_S: longest part of a sound that counts as one call, s.
+_PAUSE_S, _LONGEST_S = 0.05, 2.0
+# Least excess of a call, as a share of the excess of the clearest call, and at all. The
+# excess is the power above the noise, summed over the cells of time and frequency.
+_FAINTEST, _LEAST_EXCESS = 0.02, 60.0
+_MOST_CALLS = 64
+
+# Least correlation of two channels with the same call, in standard deviations of the
+# correlation at other lags.
+_STANDS_OUT = 5.0
+
+# Number of sets of lags to compare.
+_CANDIDATES = 4
+
+# Columns of a correlation per sample.
+_DENSITY = 2
+
+
+class Call(NamedTuple):
+    """A call in the channel in which it is clearest."""
+
+    channel: int
+    first: int
+    """First sample."""
+    last: int
+    """Sample after the last one."""
+
+
+@dataclass(frozen=True)
+class CallSearch:
+    """Search for the delays of each call in a recording of n recorders."""
+
+    channels: NDArray[np.float32]
+    """(n, samples) recorded sound."""
+    sample_rate_hz: float
+    band_hz: tuple[float, float]
+    shape: ArrayShape
+    c: float
+    slack_s: float = 0.0
+    """Time by which delays may exceed the limit from the stated positions, s."""
+
+    @cached_property
+    def sounds(self) -> list[StandingSound]:
+        """Sound of each channel without noise."""
+        return [
+            standing_sound(row, self.sample_rate_hz, self.band_hz)
+            for row in self.channels
+        ]
+
+    @cached_property
+    def travel(self) -> NDArray[np.int64]:
+        """(n, n) longest possible delays between channels, samples."""
+        p = self.shape.p_AM
+        apart = np.linalg.norm(p[:, np.newaxis] - p, axis=2) / self.c + self.slack_s
+        return np.ceil(apart * self.sample_rate_hz).astype(np.int64)
+
+    def sightings(self) -> list[Sighting]:
+        """Finds the calls whose delays are known, in the order of time."""
+        return sorted(self._sightings(), key=lambda sighting: sighting.t_s)
+
+    def _sightings(self) -> Iterator[Sighting]:
+        step = self.sounds[0].step
+        excess = np.array([sound.excess for sound in self.sounds], dtype=np.float64)
+        clearest = 0.0
+        for _ in range(_MOST_CALLS):
+            call, size = self._clearest_call(excess)
+            clearest = max(clearest, size)
+            if size < max(_LEAST_EXCESS, _FAINTEST * clearest):
+                return
+            lags, sighting = self._delays(call)
+            for k, lag in lags.items():
+                first, last = (max(0, at + lag) // step for at in call[1:])
+                excess[k, first : last + 2] = 0.0
+            if sighting is not None:
+                yield sighting
+
+    def _clearest_call(self, excess: NDArray[np.float64]) -> tuple[Call, float]:
+        """Returns the part of a channel with the largest sum of excess, and this sum."""
+        step = self.sounds[0].step
+        pause = max(2, math.ceil(_PAUSE_S * self.sample_rate_hz / step))
+        longest = max(2, math.ceil(_LONGEST_S * self.sample_rate_hz / step))
+        best, size = Call(0, 0, 0), 0.0
+        for k, row in enumerate(excess):
+            sounding = np.flatnonzero(row)
+            if not sounding.size:
+                continue
+            parts = np.split(sounding, np.flatnonzero(np.diff(sounding) > pause) + 1)
+            for part in parts:
+                for at in range(0, part.size, longest):
+                    some = part[at : at + longest]
+                    if (value := float(row[some].sum())) > size:
+                        best = Call(k, (some[0] - 1) * step, (some[-1] + 1) * step)
+                        size = value
+        return best, size
+
+    def _delays(self, call: Call) -> tuple[dict[int, int], Sighting | None]:
+        """Returns the lags of a call in the channels that hear it, and its delays."""
+        whole = {call.channel: 0}
+        order = [call.channel, *np.flatnonzero(np.arange(self.shape.count) != call.channel)]
+        heard = self._heard_lags(call, order)
+        whole |= heard
+        if len(whole) < 3:
+            return whole, None
+        channels = sorted(whole)
+        lags = np.array([whole[k] for k in channels])
+        pieces = self._pieces(call, channels, lags)
+        power = np.mean(pieces**2, axis=1, keepdims=True)
+        size = fft.next_fast_len(2 * pieces.shape[1], real=True)
+        spectra = fft.rfft(pieces / np.sqrt(power), size)
+        f = fft.rfftfreq(size, 1.0 / self.sample_rate_hz)
+        inside = (f >= self.band_hz[0]) & (f <= self.band_hz[1])
+        spectra = spectra[:, np.newaxis, inside].astype(np.complex64)
+        weights = _share_of_sound(spectra)
+        fit = fit_aligned_delays(spectra, weights, 2.0 * math.pi * f[inside])
+        if fit is None:
+            return whole, None
+        rate = self.sample_rate_hz
+        tau = fit.tau + (lags[1:] - lags[0]) / rate
+        later, covariance = self._of_all(channels, tau, fit.covariance)
+        middle = 0.5 * (call.first + call.last) / rate
+        return whole, Sighting(
+            tau=later,
+            covariance=covariance,
+            coherence=fit.coherence,
+            agreement=fit.agreement,
+            t_s=middle,
+        )
+
+    def _of_all(
+        self,
+        channels: list[int],
+        tau: NDArray[np.float64],
+        covariance: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns delays and covariance of all channels after channel 0.
+
+        A channel that does not hear the call has the largest possible error.
+        """
+        n = self.shape.count
+        at, of_at = np.zeros(n), np.zeros((n, n))
+        at[channels[1:]] = tau
+        of_at[np.ix_(channels[1:], channels[1:])] = covariance
+        deaf = np.setdiff1d(np.arange(n), channels)
+        at[deaf] = at[channels].mean()
+        of_at[deaf, deaf] = self.shape.max_delay(self.c) ** 2
+        after = np.hstack((-np.ones((n - 1, 1)), np.eye(n - 1)))
+        return after @ at, after @ of_at @ after.T
+
+    def _pieces(
+        self, call: Call, channels: list[int], lags: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Returns the (k, m) samples of a call in k channels, shifted by the lags."""
+        take = np.arange(call.first, call.last)
+        out = np.zeros((len(channels), take.size))
+        for row, k, lag in zip(out, channels, lags, strict=True):
+            samples = self.sounds[k].samples
+            inside = (take + lag >= 0) & (take + lag < samples.size)
+            row[inside] = samples[(take + lag)[inside]]
+        return out
+
+    def _heard_lags(self, call: Call, order: list[int]) -> dict[int, int]:
+        """Returns the lags of the other channels that hear a call, samples."""
+        rate, most = self.sample_rate_hz, int(self.travel[call.channel].max())
+        width = call.last - call.first + 2 * most
+        size = fft.next_fast_len(2 * width, real=True)
+        spectra = []
+        for k in order:
+            reach = int(self.travel[call.channel, k])
+            around = call._replace(first=call.first - reach, last=call.last + reach)
+            piece = self._pieces(around, [k], np.zeros(1, dtype=np.int64))[0]
+            padded = np.zeros(width)
+            padded[most - reach : most - reach + piece.size] = piece
+            spectrum = fft.rfft(padded, size)
+            spectra.append(spectrum / max(float(np.linalg.norm(spectrum)), 1e-30))
+        f = fft.rfftfreq(size, 1.0 / rate)
+        inside = np.flatnonzero((f >= self.band_hz[0]) & (f <= self.band_hz[1]))
+        band = slice(inside[0], inside[-1] + 1)
+        all_spectra = np.array(spectra)[:, band].astype(np.complex64)
+        flat = _whitened(all_spectra)
+        n = len(order)
+        pairs = np.stack(np.triu_indices(n, 1), axis=1)
+        reach = _DENSITY * self.travel[np.ix_(order, order)][tuple(pairs.T)]
+        values = np.empty((len(pairs), 2 * int(reach.max()) + 1), dtype=np.float32)
+        for row, (i, j) in zip(values, pairs, strict=True):
+            cross = (flat[i].conj() * flat[j])[np.newaxis]
+            row[:] = correlations_at_lags(
+                cross, band, _DENSITY * size, int(reach.max())
+            )[0]
+        # Deviation of the correlation at other lags.
+        middle = int(reach.max())
+        for row, r in zip(values, reach, strict=True):
+            inside_row = row[middle - r : middle + r + 1]
+            row /= max(float(np.sqrt(np.mean(inside_row**2))), 1e-30)
+        sets = consistent_lags(values, pairs, reach, _CANDIDATES)
+        if not sets:
+            return {}
+        best: dict[int, int] = {}
+        score = 0.0
+        for lags in sets:
+            at = middle + lags[pairs[:, 1]] - lags[pairs[:, 0]]
+            table = np.zeros((n, n))
+            table[tuple(pairs.T)] = [
+                row[max(0, a - 2) : a + 3].max(initial=0.0)
+                for row, a in zip(values, at, strict=True)
+            ]
+            table += table.T
+            members = [0]
+            rest = set(range(1, n))
+            while rest:
+                k = max(rest, key=lambda k: table[k, members].mean())
+                if table[k, members].mean() < _STANDS_OUT:
+                    break
+                members.append(k)
+                rest.remove(k)
+            total = float(table[np.ix_(members, members)].sum())
+            if total > score:
+                score = total
+                best = {
+                    int(order[k]): int(np.rint(lags[k] / _DENSITY)) for k in members[1:]
+                }
+        return best
+
+
+def _whitened(spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Flattens (n, f) spectra where they are strong, and keeps the rest weak."""
+    size = np.abs(spectra)
+    return spectra / (size + size.mean(axis=1, keepdims=True))
+
+
+def _share_of_sound(spectra: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Returns the (1, f) weights of frequencies, near 1 where the sound is strong."""
+    power = np.mean(np.abs(spectra) ** 2, axis=0)
+    return (power / (power + power.mean())).astype(np.float32)
