@@ -21,7 +21,7 @@ from scipy import fft
 
 from analysis.arrays.aligned_delays import fit_aligned_delays
 from analysis.arrays.recording_search import Sighting
-from analysis.arrays.standing_sounds import StandingSound, standing_sound
+from analysis.arrays.standing_sounds import StandingSound, sounding_band, standing_sound
 from systems.delays.correlations import correlations_at_lags
 from systems.delays.delay_sets import consistent_lags
 from systems.sound.array_shape import ArrayShape
@@ -83,11 +83,34 @@ class CallSearch:
         apart = np.linalg.norm(p[:, np.newaxis] - p, axis=2) / self.c + self.slack_s
         return np.ceil(apart * self.sample_rate_hz).astype(np.int64)
 
-    def sightings(self) -> list[Sighting]:
-        """Finds the calls whose delays are known, in the order of time."""
-        return sorted(self._sightings(), key=lambda sighting: sighting.t_s)
+    @cached_property
+    def stretches(self) -> list[Call]:
+        """The calls, in the order in which they were found."""
+        return [call for call, _ in self._found]
 
-    def _sightings(self) -> Iterator[Sighting]:
+    @cached_property
+    def found_band_hz(self) -> tuple[float, float]:
+        """Band that contains the sounds of all channels, Hz."""
+        of_bins = np.sum([sound.of_bins for sound in self.sounds], axis=0)
+        whole = self.sounds[0]._replace(of_bins=of_bins)
+        return sounding_band(whole, self.sample_rate_hz) or self.band_hz
+
+    @property
+    def stretch_s(self) -> float:
+        """Median duration of a call, s."""
+        lengths = [call.last - call.first for call in self.stretches]
+        return float(np.median(lengths or [0])) / self.sample_rate_hz
+
+    def sightings(self) -> list[Sighting]:
+        """Returns the calls whose delays are known, in the order of time."""
+        known = [sighting for _, sighting in self._found if sighting is not None]
+        return sorted(known, key=lambda sighting: sighting.t_s)
+
+    @cached_property
+    def _found(self) -> list[tuple[Call, Sighting | None]]:
+        return list(self._search())
+
+    def _search(self) -> Iterator[tuple[Call, Sighting | None]]:
         step = self.sounds[0].step
         excess = np.array([sound.excess for sound in self.sounds], dtype=np.float64)
         clearest = 0.0
@@ -100,8 +123,7 @@ class CallSearch:
             for k, lag in lags.items():
                 first, last = (max(0, at + lag) // step for at in call[1:])
                 excess[k, first : last + 2] = 0.0
-            if sighting is not None:
-                yield sighting
+            yield call, sighting
 
     def _clearest_call(self, excess: NDArray[np.float64]) -> tuple[Call, float]:
         """Returns the part of a channel with the largest sum of excess, and this sum."""

@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
+from analysis.arrays.call_placement import place_call
+from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_faults import ChannelFault
-from analysis.arrays.heard_sources import heard_sources
+from analysis.arrays.heard_sources import HeardSources, heard_sources
 from analysis.arrays.locate_result import LocatedSource, SourceEstimate
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
@@ -32,6 +34,11 @@ _CLEAR = 0.5
 # Largest error of the distances between microphones, in standard deviations.
 _SLACK = 4.0
 
+# _CALLS_S: least travel time of sound along an array whose calls are looked for singly,
+#   if nothing else is found, s.
+# _WIDEST: largest number of periods of sound along the array for a grid of positions.
+_CALLS_S, _WIDEST = 0.005, 20_000.0
+
 # Faults that make channels appear late.
 _EXPLAINS_LATENESS = ("size", "near")
 
@@ -43,12 +50,19 @@ class HeardRecording(NamedTuple):
     """
 
     recording: RecordingSpectra
-    search: RecordingSearch
+    search: RecordingSearch | CallSearch
     sightings: list[Sighting]
     """Delays of the stretches in which one source position stands out."""
     estimates: list[SourceEstimate]
     """Estimated source positions, for the sightings whose delays fit a position."""
     faults: list[ChannelFault]
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Band in use: that of the calls, or that of all snapshots."""
+        if isinstance(self.search, CallSearch):
+            return self.search.found_band_hz
+        return self.recording.low_hz, self.recording.high_hz
 
 
 def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource:
@@ -79,16 +93,21 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
         "position_std_m": known.budget.position_std,
         "delay_std_s": known.budget.delay_std,
         "largest_range_error": known.largest_range_error,
-        "band_hz": [spectra.low_hz, spectra.high_hz],
+        "band_hz": list(heard.band_hz),
         "sample_rate_hz": recorded.rate,
         "frame_s": search.stretch_s,
     }
-    sources = heard_sources(
-        spectra.channels,
-        shape,
-        known.c,
-        spectra.sample_rate_hz,
-        (spectra.low_hz, spectra.high_hz),
+    # No plane wave passes recorders far apart.
+    sources = (
+        HeardSources()
+        if known.far_apart
+        else heard_sources(
+            spectra.channels,
+            shape,
+            known.c,
+            spectra.sample_rate_hz,
+            (spectra.low_hz, spectra.high_hz),
+        )
     )
     return LocatedSource(
         array,
@@ -112,15 +131,21 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     return HeardRecording(recording, search, sightings, estimates, faults)
 
 
-_Heard = tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]
+_Heard = tuple[RecordingSearch | CallSearch, list[Sighting], list[SourceEstimate]]
 
 
 def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
     """Locates each short sound of a recording, or else each stretch of time.
 
     If the recording does not mostly consist of short sounds, the stretches are the
-    shortest ones that give enough estimates.
+    shortest ones that give enough estimates. If the microphones are far apart, each
+    call is looked for in all channels instead.
     """
+    if array.far_apart:
+        heard = _called(recording, array)
+        wide = recording.high_hz * recording.travel_s > _WIDEST
+        if heard[2] or wide or not recording.starts.size:
+            return heard
     sounds = [
         OnsetSpectra(
             recording.channels,
@@ -142,7 +167,24 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
         if len(heard[2]) >= min(LEAST_SIGHTINGS, len(heard[0].stretches)):
             break
     assert best is not None
+    if not best[2] and recording.travel_s > _CALLS_S:
+        return _called(recording, array)
     return best
+
+
+def _called(recording: RecordingSpectra, array: KnownArray) -> _Heard:
+    search = CallSearch(
+        recording.channels,
+        recording.sample_rate_hz,
+        (recording.low_hz, recording.high_hz),
+        array.shape,
+        array.c,
+        _SLACK * array.budget.position_std / array.c,
+    )
+    sightings = search.sightings()
+    placed = ((s.t_s, place_call(s, array)) for s in sightings)
+    found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
+    return search, sightings, found
 
 
 def _clearest(heard: list[_Heard]) -> _Heard:

@@ -10,7 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_geometry import (
+    HIGHEST_HZ,
     LEAST_BAND_HZ,
+    LOWEST_FAR_APART_HZ,
+    LOWEST_HZ,
+    TOP_OF_RATE,
     ArrayGeometry,
     usable_band,
 )
@@ -20,6 +24,7 @@ from analysis.arrays.frame_delays import exchanged
 from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.recording_search import RecordingSearch
 from analysis.arrays.recording_spectra import RecordingSpectra
+from analysis.arrays.standing_sounds import sounding_band, standing_sound
 from systems.framework.input_error import InputError
 
 #: Numbers of snapshots per stretch to try, in this order. A faint or distant source
@@ -72,7 +77,7 @@ def prepared_recording(
     shape = known.shape
     whole = geometry.columns == tuple(range(len(samples)))
     channels = samples if whole else samples[list(geometry.columns)]
-    low, high = usable_band(geometry.band, rate)
+    low, high = _band(channels, geometry, float(rate))
     high = min(high, max(top_hz, low + LEAST_BAND_HZ))
 
     def spectra(channels: NDArray[np.float64]) -> RecordingSpectra:
@@ -86,7 +91,7 @@ def prepared_recording(
         return search.mean_response()
 
     drift = None
-    if trusts_positions:
+    if trusts_positions and not known.far_apart:
         drift = recording_drift(channels, float(rate), shape.p_AM, known.c)
     # The delays of drifting channels fit no position, so no other check of delays
     # applies.
@@ -94,20 +99,51 @@ def prepared_recording(
         [drift]
         if drift
         else find_channel_faults(
-            channels, known, sample_rate_hz=float(rate), band_hz=geometry.band
+            channels,
+            known,
+            sample_rate_hz=float(rate),
+            band_hz=geometry.band or ((low, high) if low > LOWEST_HZ else None),
         )
     )
     if not trusts_positions:
         faults = [fault for fault in faults if fault.kind != "swapped"]
     channels, faults = channels_without_faults(channels, faults, agreement, where)
     recording = spectra(channels)
-    if not recording.starts.size:
+    if not recording.starts.size and not known.far_apart:
         raise InputError(
             "recording",
             f"{where} has {channels.shape[1]} samples, fewer than one frame of "
             f"{recording.window.size}; record longer",
         )
     return recording, faults
+
+
+def _band(
+    channels: NDArray[np.float64], geometry: ArrayGeometry, sample_rate_hz: float
+) -> tuple[float, float]:
+    """Returns the band to use, Hz.
+
+    The default band leaves out ultrasound, unless most of the sound is ultrasound.
+    """
+    low, high = usable_band(geometry.band, sample_rate_hz)
+    top = TOP_OF_RATE * sample_rate_hz
+    if geometry.band is not None:
+        return low, high
+    if geometry.known.far_apart:
+        return LOWEST_FAR_APART_HZ, top
+    if top <= HIGHEST_HZ:
+        return low, high
+    loudest = channels[int(np.argmax(np.nan_to_num(np.var(channels, axis=1))))]
+    if not np.isfinite(loudest).all():
+        return low, high
+    sound = standing_sound(loudest.astype(np.float32), sample_rate_hz, (low, top))
+    step = sample_rate_hz / (2.0 * (sound.of_bins.size - 1))
+    below = sound.of_bins[: math.ceil(HIGHEST_HZ / step)].sum()
+    band = sounding_band(sound, sample_rate_hz)
+    if band is None or 2.0 * below > sound.of_bins.sum():
+        return low, high
+    first = max(low, band[0])
+    return first, min(max(band[1], first + LEAST_BAND_HZ), top)
 
 
 def channels_without_faults(

@@ -29,6 +29,9 @@ _QUIET_TO_MEAN = -1.0 / math.log(1.0 - _QUIET)
 # cells. Noise exceeds it in fewer than one of 10^4 cells.
 _ABOVE = 3.5
 
+# Share of the cells with a sound that are outside the band of the sounds, at each end.
+_EDGE = 0.01
+
 # Number of cells that are processed at once.
 _BLOCK = 4096
 
@@ -90,3 +93,18 @@ def standing_sound(
     of_bins[inside] = loud.sum(axis=0)
     excess = np.where(loud, np.maximum(ratio - 1.0, 0.0), 0.0).sum(axis=1)
     return StandingSound(out[hop : hop + channel.size], excess, of_bins)
+
+
+def sounding_band(
+    sound: StandingSound, sample_rate_hz: float
+) -> tuple[float, float] | None:
+    """Returns the band that contains nearly all cells with a sound, Hz.
+
+    The result is None if there are no such cells.
+    """
+    cells = np.cumsum(sound.of_bins)
+    if not cells[-1]:
+        return None
+    low, high = np.searchsorted(cells, np.array([_EDGE, 1.0 - _EDGE]) * cells[-1])
+    step = sample_rate_hz / _CELL
+    return max(0.0, (low - 1) * step), (high + 1) * step
