@@ -190,6 +190,13 @@ def open_sound(
     from systems.framework.input_error import InputError
 
     known = make_geometry(geometry)
+    if known.known.far_apart:
+        size = known.known.shape.aperture_m
+        raise InputError(
+            "geometry",
+            f"has recorders {size:.3g} m apart, past which no plane wave travels; locate "
+            "their calls with 'phonotaxis locate'",
+        )
     every = max(known.columns) + 1
     if sound is None:
         stream = open_card(

@@ -96,6 +96,8 @@ class KnownArray:
     """Standard deviation of a channel's gain, dB."""
     largest_range_error: float = 0.2
     """Largest standard deviation of a reported range, as a share of the range."""
+    centroid_m: tuple[float, ...] | None = None
+    """Centroid of the microphones in the frame of the geometry file, m. None: zero."""
 
     @property
     def far_apart(self) -> bool:
@@ -233,6 +235,7 @@ class ArrayGeometry(Parameters):
             budget=ArrayBudget(of_places, self._speed_std(), self.delay_std_s),
             gain_std_db=self.gain_std_db,
             largest_range_error=self.largest_range_error,
+            centroid_m=tuple(np.mean(self.microphones, axis=0).tolist()),
         )
 
     def _of_places(self, shape: ArrayShape) -> NDArray[np.float64]:

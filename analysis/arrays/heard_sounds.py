@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_geometry import ArrayGeometry
+from analysis.arrays.call_search import CallSearch
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
     SNAPSHOTS,
@@ -29,6 +30,10 @@ _FARTHEST = 3.0
 # channel. It is a share of the travel time of sound along the array, for each part of
 # the sound that is not coherent.
 _SCATTER_SHARE = 0.015
+
+
+# Largest error of the distances between distant recorders, in standard deviations.
+_SLACK = 4.0
 
 
 @dataclass(frozen=True)
@@ -76,9 +81,21 @@ def sightings_of(
         top_hz=top_hz,
         trusts_positions=False,
     )
+    known = geometry.known
+    if known.far_apart:
+        band_hz = (recording.low_hz, recording.high_hz)
+        calls = CallSearch(
+            recording.channels,
+            recording.sample_rate_hz,
+            band_hz,
+            known.shape,
+            known.c,
+            _SLACK * known.budget.position_std / known.c,
+        )
+        return calls.sightings(), [fault.message for fault in faults]
     found: list[Sighting] = []
     for snapshots in SNAPSHOTS:
-        search = RecordingSearch(recording, geometry.known.shape, geometry.c, snapshots)
+        search = RecordingSearch(recording, known.shape, known.c, snapshots)
         heard = list(search.sightings())
         found = max(found, heard, key=len)
         if len(found) >= min(LEAST_SIGHTINGS, len(search.stretches)):

@@ -39,6 +39,9 @@ _SLACK = 4.0
 # _WIDEST: largest number of periods of sound along the array for a grid of positions.
 _CALLS_S, _WIDEST = 0.005, 20_000.0
 
+# Delays below this share of the longest possible delay are suspicious.
+_ALIKE = 0.01
+
 # Faults that make channels appear late.
 _EXPLAINS_LATENESS = ("size", "near")
 
@@ -125,10 +128,28 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     recording, faults = prepared_recording(recorded, geometry)
     known = geometry.known
     search, sightings, estimates = _estimates(recording, known)
+    if isinstance(search, CallSearch):
+        faults += _alike(sightings, known)
+        return HeardRecording(recording, search, sightings, estimates, faults)
     late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
     return HeardRecording(recording, search, sightings, estimates, faults)
+
+
+def _alike(sightings: list[Sighting], array: KnownArray) -> list[ChannelFault]:
+    """Reports that all calls arrive everywhere at about the same time."""
+    longest = array.shape.max_delay(array.c)
+    spans = [float(np.ptp(np.append(s.tau, 0.0))) for s in sightings]
+    if not spans or max(spans) > _ALIKE * longest:
+        return []
+    text = (
+        f"microphones: all sounds arrive within {1e3 * max(spans):.2g} ms, and an "
+        f"array of {array.shape.aperture_m:.3g} m can have delays of "
+        f"{1e3 * longest:.3g} ms; give positions in m, unless the source is equally "
+        "far from all microphones"
+    )
+    return [ChannelFault("size", (), text)]
 
 
 _Heard = tuple[RecordingSearch | CallSearch, list[Sighting], list[SourceEstimate]]
@@ -183,7 +204,11 @@ def _called(recording: RecordingSpectra, array: KnownArray) -> _Heard:
     )
     sightings = search.sightings()
     placed = ((s.t_s, place_call(s, array)) for s in sightings)
-    found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
+    found = [
+        SourceEstimate.of(t_s, at, array.centroid_m)
+        for t_s, at in placed
+        if at is not None
+    ]
     return search, sightings, found
 
 
@@ -214,5 +239,9 @@ def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _H
     )
     sightings = list(search.sightings())
     placed = ((s.t_s, place_source(s, array)) for s in sightings)
-    found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
+    found = [
+        SourceEstimate.of(t_s, at, array.centroid_m)
+        for t_s, at in placed
+        if at is not None
+    ]
     return search, sightings, found

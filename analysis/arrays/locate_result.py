@@ -54,14 +54,25 @@ class SourceEstimate:
     """Standard deviation of the range, m."""
     range_systematic_m: float | None
     """Part of the standard deviation of the range from errors of the array, m."""
+    position_m: tuple[float, ...] | None = None
+    """Position (x, y) or (x, y, z) in the frame of the geometry file, m. None if there
+    is no range."""
+    position_covariance_m2: tuple[tuple[float, ...], ...] | None = None
+    """Covariance of the position, including the errors of the array, m^2."""
 
     @classmethod
-    def of(cls, t_s: float, placed: PlacedSource) -> SourceEstimate:
+    def of(
+        cls,
+        t_s: float,
+        placed: PlacedSource,
+        centroid_m: tuple[float, ...] | None = None,
+    ) -> SourceEstimate:
         """Makes an estimate from a source position. Unmeasurable values become None.
 
         Args:
             t_s: Middle of the stretch, s from the start of the recording.
             placed: Source position in the frame of the array, m, and its errors.
+            centroid_m: Centroid of the microphones, m. None: zero.
 
         Returns:
             The estimate, with angles in deg and the range in m.
@@ -75,6 +86,7 @@ class SourceEstimate:
 
         bearing = degrees(fix.bearing, fix.bearing_std)
         ranged = fix.range_valid
+        origin = np.array(centroid_m or np.zeros(fix.p_AS.size))
         return cls(
             t_s=t_s,
             bearing_deg=None if bearing is None else wrapped_deg(bearing),
@@ -88,6 +100,10 @@ class SourceEstimate:
             range_m=fix.range if ranged else None,
             range_std_m=fix.range_std if ranged else None,
             range_systematic_m=systematic.range_std if ranged else None,
+            position_m=tuple((fix.p_AS + origin).tolist()) if ranged else None,
+            position_covariance_m2=tuple(map(tuple, fix.covariance.tolist()))
+            if ranged
+            else None,
         )
 
 
@@ -156,6 +172,7 @@ class LocatedSource:
             "range_systematic_m": _usual(
                 [] if range_m is None else [e.range_systematic_m for e in main]
             ),
+            **_position([] if range_m is None else main),
             "number_of_sources": self.number_of_sources,
             "observable": [name for name, value in told.items() if value is not None],
             "ambiguity": self.shape.ambiguity,
@@ -263,6 +280,23 @@ def _median(
     center = float(np.interp(0.5 * weights.sum(), below, values[order]))
     scatter = MAD_TO_STD * float(np.median(np.abs(values - center)))
     return center, max(scatter, float(np.median(errors)))
+
+
+def _position(estimates: Sequence[SourceEstimate]) -> dict[str, Any]:
+    """Returns the median position of estimates, and the covariance of a single one.
+
+    A larger number of estimates does not reduce the covariance, because the estimates
+    may have a common error.
+    """
+    placed = [e for e in estimates if e.position_m is not None]
+    if not placed:
+        return {"position_m": None, "position_covariance_m2": None}
+    covariance = np.median([e.position_covariance_m2 for e in placed], axis=0)
+    center = np.median([e.position_m for e in placed], axis=0)
+    return {
+        "position_m": center.tolist(),
+        "position_covariance_m2": covariance.tolist(),
+    }
 
 
 def _usual(values: Sequence[float | None]) -> float | None:
