@@ -39,6 +39,10 @@ _UNLIKELY, _MOST_PLACES, _SAME = 30.0, 8, 0.5
 # errors, with _TAIL degrees of freedom.
 _DRAWS, _ROUNDS, _TAIL = 3000, 4, 5.0
 
+# Largest distance of the microphones from their plane or line, in standard deviations
+# of the positions, at which the array cannot distinguish the two sides.
+_LEVEL = 3.0
+
 # Standard deviation of the height of a source, as a share of the aperture, if the
 # positions of the microphones are given by (x, y).
 _HEIGHT = 0.25
@@ -144,6 +148,9 @@ def _problem(
     half = shape.ahead is not None
     if shape.ahead is not None:
         axes = np.vstack((shape.span, shape.ahead))
+        # Recorders on slightly different levels distinguish the two sides.
+        off = float(np.abs(p @ shape.ahead).max())
+        half = shape.side is not None or off < _LEVEL * array.budget.position_std
     elif shape.dimension == 2:
         # The source may be above the plane of the microphones.
         p, axes, half = np.pad(p, ((0, 0), (0, 1))), np.eye(3), True

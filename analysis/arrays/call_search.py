@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from analysis.arrays.aligned_delays import fit_aligned_delays
+from analysis.arrays.array_geometry import KnownArray
 from analysis.arrays.recording_search import Sighting
+from analysis.arrays.recording_spectra import RecordingSpectra
 from analysis.arrays.standing_sounds import StandingSound, sounding_band, standing_sound
 from systems.delays.correlations import correlations_at_lags
 from systems.delays.delay_sets import consistent_lags
-from systems.sound.array_shape import ArrayShape
 
 # _PAUSE_S: a longer pause separates two calls, s.
 # _LONGEST_S: longest part of a sound that counts as one call, s.
@@ -37,6 +38,9 @@ _MOST_CALLS = 64
 # Least correlation of two channels with the same call, in standard deviations of the
 # correlation at other lags.
 _STANDS_OUT = 5.0
+
+# Largest error of the distances and of the speed of sound, in standard deviations.
+_DEVIATIONS = 4.0
 
 # Number of sets of lags to compare.
 _CANDIDATES = 4
@@ -63,10 +67,17 @@ class CallSearch:
     """(n, samples) recorded sound."""
     sample_rate_hz: float
     band_hz: tuple[float, float]
-    shape: ArrayShape
-    c: float
-    slack_s: float = 0.0
-    """Time by which delays may exceed the limit from the stated positions, s."""
+    array: KnownArray
+
+    @classmethod
+    def of(cls, recording: RecordingSpectra, array: KnownArray) -> CallSearch:
+        """Makes the search for the calls in the channels of a recording."""
+        return cls(
+            recording.channels,
+            recording.sample_rate_hz,
+            (recording.low_hz, recording.high_hz),
+            array,
+        )
 
     @cached_property
     def sounds(self) -> list[StandingSound]:
@@ -79,9 +90,13 @@ class CallSearch:
     @cached_property
     def travel(self) -> NDArray[np.int64]:
         """(n, n) longest possible delays between channels, samples."""
-        p = self.shape.p_AM
-        apart = np.linalg.norm(p[:, np.newaxis] - p, axis=2) / self.c + self.slack_s
-        return np.ceil(apart * self.sample_rate_hz).astype(np.int64)
+        p, c, budget = self.array.shape.p_AM, self.array.c, self.array.budget
+        apart = np.linalg.norm(p[:, np.newaxis] - p, axis=2)
+        longer = np.hypot(
+            math.sqrt(2.0) * budget.position_std, apart * budget.speed_std / c
+        )
+        longest_s = (apart + _DEVIATIONS * longer) / c
+        return np.ceil(longest_s * self.sample_rate_hz).astype(np.int64)
 
     @cached_property
     def stretches(self) -> list[Call]:
@@ -147,7 +162,7 @@ class CallSearch:
     def _delays(self, call: Call) -> tuple[dict[int, int], Sighting | None]:
         """Returns the lags of a call in the channels that hear it, and its delays."""
         whole = {call.channel: 0}
-        order = [call.channel, *np.flatnonzero(np.arange(self.shape.count) != call.channel)]
+        order = [call.channel, *np.flatnonzero(np.arange(self.array.shape.count) != call.channel)]
         heard = self._heard_lags(call, order)
         whole |= heard
         if len(whole) < 3:
@@ -187,13 +202,13 @@ class CallSearch:
 
         A channel that does not hear the call has the largest possible error.
         """
-        n = self.shape.count
+        n = self.array.shape.count
         at, of_at = np.zeros(n), np.zeros((n, n))
         at[channels[1:]] = tau
         of_at[np.ix_(channels[1:], channels[1:])] = covariance
         deaf = np.setdiff1d(np.arange(n), channels)
         at[deaf] = at[channels].mean()
-        of_at[deaf, deaf] = self.shape.max_delay(self.c) ** 2
+        of_at[deaf, deaf] = self.array.shape.max_delay(self.array.c) ** 2
         after = np.hstack((-np.ones((n - 1, 1)), np.eye(n - 1)))
         return after @ at, after @ of_at @ after.T
 

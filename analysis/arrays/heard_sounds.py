@@ -32,10 +32,6 @@ _FARTHEST = 3.0
 _SCATTER_SHARE = 0.015
 
 
-# Largest error of the distances between distant recorders, in standard deviations.
-_SLACK = 4.0
-
-
 @dataclass(frozen=True)
 class HeardSound:
     """Delays of a sound at rest."""
@@ -83,16 +79,8 @@ def sightings_of(
     )
     known = geometry.known
     if known.far_apart:
-        band_hz = (recording.low_hz, recording.high_hz)
-        calls = CallSearch(
-            recording.channels,
-            recording.sample_rate_hz,
-            band_hz,
-            known.shape,
-            known.c,
-            _SLACK * known.budget.position_std / known.c,
-        )
-        return calls.sightings(), [fault.message for fault in faults]
+        calls = CallSearch.of(recording, known).sightings()
+        return calls, [fault.message for fault in faults]
     found: list[Sighting] = []
     for snapshots in SNAPSHOTS:
         search = RecordingSearch(recording, known.shape, known.c, snapshots)

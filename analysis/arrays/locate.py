@@ -194,14 +194,7 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
 
 
 def _called(recording: RecordingSpectra, array: KnownArray) -> _Heard:
-    search = CallSearch(
-        recording.channels,
-        recording.sample_rate_hz,
-        (recording.low_hz, recording.high_hz),
-        array.shape,
-        array.c,
-        _SLACK * array.budget.position_std / array.c,
-    )
+    search = CallSearch.of(recording, array)
     sightings = search.sightings()
     placed = ((s.t_s, place_call(s, array)) for s in sightings)
     found = [
