@@ -99,9 +99,7 @@ class _Problem:
     ) -> NDArray[np.float64]:
         """Returns (k,) chi-squares, with the prior of the height."""
         height = self.places(y)[:, -1] / self.height_std
-        return np.asarray(
-            np.sum((self.residuals(y) @ root.T) ** 2, axis=1) + height**2
-        )
+        return np.asarray(np.sum((self.residuals(y) @ root.T) ** 2, axis=1) + height**2)
 
 
 def place_call(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
@@ -111,7 +109,7 @@ def place_call(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     ``largest_range_error`` of the range, or of half the aperture if that is longer. The
     result is None if no place fits the delays.
     """
-    shape, c = array.shape, array.c
+    shape = array.shape
     problem, axes = _problem(delays, array)
     allowed = _errors(np.zeros(shape.dimension), array)
     for _ in range(2):

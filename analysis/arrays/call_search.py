@@ -141,7 +141,7 @@ class CallSearch:
             yield call, sighting
 
     def _clearest_call(self, excess: NDArray[np.float64]) -> tuple[Call, float]:
-        """Returns the part of a channel with the largest sum of excess, and this sum."""
+        """Returns the part of a channel with the most excess, and its excess."""
         step = self.sounds[0].step
         pause = max(2, math.ceil(_PAUSE_S * self.sample_rate_hz / step))
         longest = max(2, math.ceil(_LONGEST_S * self.sample_rate_hz / step))
@@ -162,7 +162,8 @@ class CallSearch:
     def _delays(self, call: Call) -> tuple[dict[int, int], Sighting | None]:
         """Returns the lags of a call in the channels that hear it, and its delays."""
         whole = {call.channel: 0}
-        order = [call.channel, *np.flatnonzero(np.arange(self.array.shape.count) != call.channel)]
+        others = set(range(self.array.shape.count)) - {call.channel}
+        order = [call.channel, *sorted(others)]
         heard = self._heard_lags(call, order)
         whole |= heard
         if len(whole) < 3:
@@ -290,7 +291,8 @@ class CallSearch:
 def _whitened(spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """Flattens (n, f) spectra where they are strong, and keeps the rest weak."""
     size = np.abs(spectra)
-    return spectra / (size + size.mean(axis=1, keepdims=True))
+    floor = size.mean(axis=1, keepdims=True) + np.finfo(np.float32).tiny
+    return spectra / (size + floor)
 
 
 def _share_of_sound(spectra: NDArray[np.complex64]) -> NDArray[np.float32]:

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
-from analysis.arrays.call_placement import place_call
 from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.heard_calls import arrivals_alike, heard_calls
 from analysis.arrays.heard_sources import HeardSources, heard_sources
 from analysis.arrays.locate_result import LocatedSource, SourceEstimate
 from analysis.arrays.prepared_recording import (
@@ -34,13 +34,12 @@ _CLEAR = 0.5
 # Largest error of the distances between microphones, in standard deviations.
 _SLACK = 4.0
 
+# _ULTRASOUND_HZ: lowest frequency of ultrasound, Hz.
 # _CALLS_S: least travel time of sound along an array whose calls are looked for singly,
 #   if nothing else is found, s.
 # _WIDEST: largest number of periods of sound along the array for a grid of positions.
-_CALLS_S, _WIDEST = 0.005, 20_000.0
+_ULTRASOUND_HZ, _CALLS_S, _WIDEST = 10_000.0, 0.005, 20_000.0
 
-# Delays below this share of the longest possible delay are suspicious.
-_ALIKE = 0.01
 
 # Faults that make channels appear late.
 _EXPLAINS_LATENESS = ("size", "near")
@@ -129,27 +128,12 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     known = geometry.known
     search, sightings, estimates = _estimates(recording, known)
     if isinstance(search, CallSearch):
-        faults += _alike(sightings, known)
+        faults += arrivals_alike(sightings, known)
         return HeardRecording(recording, search, sightings, estimates, faults)
     late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
     return HeardRecording(recording, search, sightings, estimates, faults)
-
-
-def _alike(sightings: list[Sighting], array: KnownArray) -> list[ChannelFault]:
-    """Reports that all calls arrive everywhere at about the same time."""
-    longest = array.shape.max_delay(array.c)
-    spans = [float(np.ptp(np.append(s.tau, 0.0))) for s in sightings]
-    if not spans or max(spans) > _ALIKE * longest:
-        return []
-    text = (
-        f"microphones: all sounds arrive within {1e3 * max(spans):.2g} ms, and an "
-        f"array of {array.shape.aperture_m:.3g} m can have delays of "
-        f"{1e3 * longest:.3g} ms; give positions in m, unless the source is equally "
-        "far from all microphones"
-    )
-    return [ChannelFault("size", (), text)]
 
 
 _Heard = tuple[RecordingSearch | CallSearch, list[Sighting], list[SourceEstimate]]
@@ -159,14 +143,22 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
     """Locates each short sound of a recording, or else each stretch of time.
 
     If the recording does not mostly consist of short sounds, the stretches are the
-    shortest ones that give enough estimates. If the microphones are far apart, each
-    call is looked for in all channels instead.
+    shortest ones that give enough estimates. If the microphones are far apart, or if
+    the sound is ultrasound, each call is looked for in all channels instead.
     """
-    if array.far_apart:
-        heard = _called(recording, array)
+    if array.far_apart or recording.low_hz > _ULTRASOUND_HZ:
+        calls = heard_calls(recording, array)
         wide = recording.high_hz * recording.travel_s > _WIDEST
-        if heard[2] or wide or not recording.starts.size:
-            return heard
+        if calls[2] or wide or not recording.starts.size:
+            return calls
+    heard = _in_windows(recording, array)
+    if not heard[2] and recording.travel_s > _CALLS_S:
+        return heard_calls(recording, array)
+    return heard
+
+
+def _in_windows(recording: RecordingSpectra, array: KnownArray) -> _Heard:
+    """Locates the source in windows that contain its sound in all channels."""
     sounds = [
         OnsetSpectra(
             recording.channels,
@@ -178,7 +170,7 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
         )
         for after_s in AFTER_S
     ]
-    if sounds[0].are_most:
+    if sounds[0].are_most and any(s.starts.size for s in sounds):
         return _clearest([_heard(s, array, snapshots=1) for s in sounds])
     best = None
     for snapshots in SNAPSHOTS:
@@ -188,21 +180,7 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
         if len(heard[2]) >= min(LEAST_SIGHTINGS, len(heard[0].stretches)):
             break
     assert best is not None
-    if not best[2] and recording.travel_s > _CALLS_S:
-        return _called(recording, array)
     return best
-
-
-def _called(recording: RecordingSpectra, array: KnownArray) -> _Heard:
-    search = CallSearch.of(recording, array)
-    sightings = search.sightings()
-    placed = ((s.t_s, place_call(s, array)) for s in sightings)
-    found = [
-        SourceEstimate.of(t_s, at, array.centroid_m)
-        for t_s, at in placed
-        if at is not None
-    ]
-    return search, sightings, found
 
 
 def _clearest(heard: list[_Heard]) -> _Heard:

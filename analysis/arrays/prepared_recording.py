@@ -112,8 +112,9 @@ def prepared_recording(
     if not recording.starts.size and not known.far_apart:
         raise InputError(
             "recording",
-            f"{where} has {channels.shape[1]} samples, fewer than one frame of "
-            f"{recording.window.size}; record longer",
+            f"{where} lasts {1e3 * channels.shape[1] / rate:.3g} ms, too short for an "
+            f"array of {shape.aperture_m:.3g} m; record at least "
+            f"{1e3 * recording.least_samples / rate:.3g} ms",
         )
     return recording, faults
 
