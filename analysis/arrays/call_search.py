@@ -253,11 +253,11 @@ class CallSearch:
             row[:] = correlations_at_lags(
                 cross, band, _DENSITY * size, int(reach.max())
             )[0]
-        # Deviation of the correlation at other lags.
+        # In units of the deviation of the correlation at other lags.
         middle = int(reach.max())
-        for row, r in zip(values, reach, strict=True):
-            inside_row = row[middle - r : middle + r + 1]
-            row /= max(float(np.sqrt(np.mean(inside_row**2))), 1e-30)
+        inside_reach = np.abs(np.arange(-middle, middle + 1)) <= reach[:, np.newaxis]
+        square = np.mean(values**2, axis=1, where=inside_reach, keepdims=True)
+        values /= np.sqrt(np.maximum(square, 1e-30))
         sets = consistent_lags(values, pairs, reach, _CANDIDATES)
         if not sets:
             return {}

@@ -11,6 +11,7 @@ from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_faults import ChannelFault
 from analysis.arrays.heard_calls import arrivals_alike, heard_calls
 from analysis.arrays.heard_sources import HeardSources, heard_sources
+from analysis.arrays.heard_tones import heard_tones, unclear_tone
 from analysis.arrays.locate_result import LocatedSource, SourceEstimate
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
@@ -25,6 +26,7 @@ from analysis.arrays.recording_spectra import (
     RecordingSpectra,
 )
 from analysis.arrays.source_placement import has_place, place_source
+from analysis.arrays.tone_search import ToneSearch
 from analysis.arrays.wavefront_misfit import late_channel
 
 # Least agreement of the channels in a window, as a share of the agreement in the best
@@ -52,7 +54,7 @@ class HeardRecording(NamedTuple):
     """
 
     recording: RecordingSpectra
-    search: RecordingSearch | CallSearch
+    search: RecordingSearch | CallSearch | ToneSearch
     sightings: list[Sighting]
     """Delays of the stretches in which one source position stands out."""
     estimates: list[SourceEstimate]
@@ -130,13 +132,19 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     if isinstance(search, CallSearch):
         faults += arrivals_alike(sightings, known)
         return HeardRecording(recording, search, sightings, estimates, faults)
+    if isinstance(search, ToneSearch):
+        if not estimates:
+            faults += unclear_tone(search, known)
+        return HeardRecording(recording, search, sightings, estimates, faults)
     late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
     return HeardRecording(recording, search, sightings, estimates, faults)
 
 
-_Heard = tuple[RecordingSearch | CallSearch, list[Sighting], list[SourceEstimate]]
+_Heard = tuple[
+    RecordingSearch | CallSearch | ToneSearch, list[Sighting], list[SourceEstimate]
+]
 
 
 def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
@@ -152,6 +160,10 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
         if calls[2] or wide or not recording.starts.size:
             return calls
     heard = _in_windows(recording, array)
+    if not heard[2]:
+        tones = heard_tones(recording, array)
+        if tones[0].are_most:
+            return tones
     if not heard[2] and recording.travel_s > _CALLS_S:
         return heard_calls(recording, array)
     return heard

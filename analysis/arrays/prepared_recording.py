@@ -84,7 +84,9 @@ def prepared_recording(
         equal = np.empty(channels.shape, dtype=np.float32)
         for row, channel in zip(equal, channels, strict=True):
             row[:] = (channel - channel.mean()) / channel.std()
-        return RecordingSpectra(equal, float(rate), low, high, shape.max_delay(known.c))
+        levels = tuple(channels.std(axis=1).tolist())
+        travel_s = shape.max_delay(known.c)
+        return RecordingSpectra(equal, float(rate), low, high, travel_s, levels)
 
     def agreement(channels: NDArray[np.float64]) -> float:
         search = RecordingSearch(spectra(channels), shape, known.c, SNAPSHOTS[0])

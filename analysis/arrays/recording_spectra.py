@@ -89,6 +89,8 @@ class RecordingSpectra:
     high_hz: float
     travel_s: float
     """Longest travel time of sound between two microphones, s."""
+    levels: tuple[float, ...] | None = None
+    """Levels of the n channels as recorded, in any unit. None: equal levels."""
 
     @cached_property
     def window(self) -> NDArray[np.float32]:

@@ -26,8 +26,9 @@ def free_field(
         size = fft.next_fast_len(samples.size + most, real=True)
         spectrum = fft.rfft(samples, size)
         w = 2.0 * np.pi * rate * fft.rfftfreq(size)
-        for row, r in zip(heard, distance, strict=True):
-            row += fft.irfft(spectrum * np.exp(-1j * w * r / c), size)[: row.size] / r
+        for k, r in enumerate(distance):
+            delayed = fft.irfft(spectrum * np.exp(-1j * w * r / c), size)
+            heard[k] += delayed[: heard.shape[1]] / r
     return heard
 
 

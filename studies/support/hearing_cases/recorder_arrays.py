@@ -27,6 +27,7 @@ TITLE = "arrays of recorders"
 _SQUARE = np.array([[0, 0, 1.5], [1, 0, 1.5], [1, 1, 1.5], [0, 1, 1.5]], dtype=float)
 _STAR = np.array([[0, 0, 0], [0, 1, 0], [0.87, -0.5, 0], [-0.87, -0.5, 0.6]])
 _TEN = np.array([[0, 0, 0], [9, 1, 0], [4, 8, 3], [-5, 6, 1], [-3, -7, 2], [6, -6, 0]])
+_FIVE = np.array([[0, 0], [25, 2], [22, 24], [-1, 20], [12, 11]], dtype=float)
 _NINE = np.array([[x, y, 1.5 + (x * y) % 3] for x in (0, 1, 2) for y in (0, 1, 2)])
 
 
@@ -93,7 +94,7 @@ def _nets() -> dict[str, _Net]:
             _TEN.astype(float), (25, 18, 3), "song", 5, place_std=0.02, known=still
         ),
         "5 within 30 m, places by GPS to 1 m": _Net(
-            np.array([[0, 0], [25, 2], [22, 24], [-1, 20], [12, 11]], dtype=float),
+            _FIVE,
             (40, 17, 0),
             "song",
             5,
@@ -101,8 +102,7 @@ def _nets() -> dict[str, _Net]:
             known=still,
         ),
         "5 within 30 m in map coordinates": _Net(
-            np.array([[0, 0], [25, 2], [22, 24], [-1, 20], [12, 11]], dtype=float)
-            + [481_300.0, 5_212_700.0],
+            _FIVE + np.array([481_300.0, 5_212_700.0]),
             (481_308, 5_212_717, 0),
             "song",
             5,
@@ -194,7 +194,7 @@ def judge_position(result: LocateResult, source: NDArray[np.float64]) -> Outcome
         f"position {told['position_m']} for {source.tolist()}"
     )
     if told["bearing_deg"] is None:
-        return Outcome(False, f"nothing; {result.faults}")
+        return Outcome(right=False, said=f"nothing; {result.faults}")
     directions = [told["bearing_deg"]]
     directions += [other["bearing_deg"] for other in told["alternatives"]]
     limit = max(3.0 * told["bearing_std_deg"], 5.0)
@@ -217,7 +217,7 @@ def _judge(net: _Net, seed: int) -> Outcome:
     try:
         result = locate(samples, geometry, sample_rate_hz=net.rate)
     except InputError as error:
-        return Outcome(False, str(error))
+        return Outcome(right=False, said=str(error))
     return judge_position(result, source)
 
 
