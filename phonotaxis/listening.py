@@ -194,8 +194,8 @@ def open_sound(
         size = known.known.shape.aperture_m
         raise InputError(
             "geometry",
-            f"has recorders {size:.3g} m apart, past which no plane wave travels; locate "
-            "their calls with 'phonotaxis locate'",
+            f"has recorders {size:.3g} m apart, too far for a live direction; locate "
+            "recordings with 'phonotaxis locate'",
         )
     every = max(known.columns) + 1
     if sound is None:

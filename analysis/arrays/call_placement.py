@@ -231,7 +231,7 @@ def _draws(
     normal, _ = _normal(problem, modes, root)
     # A place that the delays do not determine in some direction stays near the array.
     normal += np.eye(q) / (0.5 * problem.aperture) ** 2
-    spread = np.linalg.inv(normal)
+    spread = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     centers, share = modes.copy(), np.full(len(modes), 1.0 / len(modes))
     for _ in range(_ROUNDS):
         of = rng.choice(len(centers), _DRAWS, p=share)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -224,6 +225,6 @@ def _judge(net: _Net, seed: int) -> Outcome:
 def cases() -> list[HearingCase]:
     """Returns the cases of this kind."""
     return [
-        HearingCase(name, lambda net=net, seed=seed: _judge(net, seed))
+        HearingCase(name, partial(_judge, net, seed))
         for seed, (name, net) in enumerate(_nets().items())
     ]

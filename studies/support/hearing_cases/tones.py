@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pyroomacoustics as pra
@@ -18,6 +19,10 @@ TITLE = "continuous tones"
 
 _C = 343.2
 
+# Array; bearing, deg, and frequencies, Hz, of each source; duration, s; sample rate, Hz;
+# signal to noise ratio, dB; reverberation time, s.
+_Row = tuple[str, list[tuple[float, tuple[float, ...]]], float, int, float, float]
+
 
 def _circle(count: int, diameter_m: float) -> NDArray[np.float64]:
     angle = 2.0 * np.pi * np.arange(count) / count
@@ -27,13 +32,15 @@ def _circle(count: int, diameter_m: float) -> NDArray[np.float64]:
 
 _ARRAYS = {
     "square of 4.57 cm": _circle(4, 0.0646),
-    "row of 4, 5 cm apart": np.array([[x, 0, 0] for x in (-0.075, -0.025, 0.025, 0.075)]),
+    "row of 4, 5 cm apart": np.outer((-0.075, -0.025, 0.025, 0.075), (1, 0, 0)),
     "circle of 6, 9.3 cm": _circle(6, 0.093),
     "circle of 8, 20 cm": _circle(8, 0.2),
     "tetrahedron of 12 cm": 0.12
     * np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.87, 0], [0.5, 0.29, 0.82]]),
-    "L of 1 m": np.array([[0, 0, 0], [0.04, 0, 0], [1, 0, 0], [0, 1.0, 0], [0, 0.04, 0]]),
-}  # fmt: skip
+    "L of 1 m": np.array(
+        [[0, 0, 0], [0.04, 0, 0], [1, 0, 0], [0, 1.0, 0], [0, 0.04, 0]]
+    ),
+}
 
 
 def _tone(
@@ -65,10 +72,10 @@ def _is_unique(
         phase = 2.0 * np.pi * f / _C * ((u - true) @ places.T)
         off = np.angle(np.exp(1j * (phase - phase[:, :1])))
         worst = np.maximum(worst, np.abs(off).max(axis=1))
-    far = np.abs(np.angle(np.exp(1j * (np.arctan2(u[:, 1], u[:, 0]))) - true[0])) >= 0.0
-    mirrored = np.abs(np.sum(places * (u - true)[:, np.newaxis], axis=2)).max(axis=1)
-    far &= mirrored > 0.15 * np.linalg.norm(places, axis=1).max()
-    return not bool(np.any(worst[far] < 0.1))
+    # Directions with nearly the same delays, such as mirror images, do not count.
+    delays = (u - true) @ places.T
+    other = np.ptp(delays, axis=1) > 0.15 * np.linalg.norm(places, axis=1).max()
+    return not bool(np.any(worst[other] < 0.1))
 
 
 def _judge(
@@ -150,8 +157,14 @@ def _in_room(
 def cases() -> list[HearingCase]:
     """Returns the cases of this kind."""
     alarm = (1000.0, 2000.0, 3000.0)
-    rows = [
-        ("square of 4.57 cm", [(50.0, (f,))], s, 16_000, snr, 0.0)
+    square, row = "square of 4.57 cm", "row of 4, 5 cm apart"
+    six, eight, tetrahedron = (
+        "circle of 6, 9.3 cm",
+        "circle of 8, 20 cm",
+        "tetrahedron of 12 cm",
+    )
+    rows: list[_Row] = [
+        (square, [(50.0, (f,))], s, 16_000, snr, 0.0)
         for f, s, snr in (
             (230.0, 1.0, 30),
             (440.0, 2.0, 20),
@@ -163,32 +176,37 @@ def cases() -> list[HearingCase]:
         )
     ]
     rows += [
-        ("row of 4, 5 cm apart", [(65.0, (1000.0,))], 1.0, 16_000, 30, 0.0),
-        ("row of 4, 5 cm apart", [(110.0, (3300.0,))], 1.0, 48_000, 20, 0.0),
-        ("row of 4, 5 cm apart", [(20.0, (5500.0,))], 1.0, 16_000, 30, 0.0),
-        ("circle of 6, 9.3 cm", [(-130.0, (700.0,))], 1.0, 48_000, 20, 0.0),
-        ("circle of 6, 9.3 cm", [(170.0, (3500.0,))], 2.0, 16_000, 30, 0.0),
-        ("circle of 8, 20 cm", [(-20.0, (1900.0,))], 1.0, 48_000, 10, 0.0),
-        ("circle of 8, 20 cm", [(75.0, (5000.0,))], 1.0, 44_100, 30, 0.0),
-        ("tetrahedron of 12 cm", [(100.0, (600.0,))], 1.0, 16_000, 30, 0.0),
-        ("tetrahedron of 12 cm", [(-60.0, (1300.0,))], 2.0, 48_000, 25, 0.0),
+        (row, [(65.0, (1000.0,))], 1.0, 16_000, 30, 0.0),
+        (row, [(110.0, (3300.0,))], 1.0, 48_000, 20, 0.0),
+        (row, [(20.0, (5500.0,))], 1.0, 16_000, 30, 0.0),
+        (six, [(-130.0, (700.0,))], 1.0, 48_000, 20, 0.0),
+        (six, [(170.0, (3500.0,))], 2.0, 16_000, 30, 0.0),
+        (eight, [(-20.0, (1900.0,))], 1.0, 48_000, 10, 0.0),
+        (eight, [(75.0, (5000.0,))], 1.0, 44_100, 30, 0.0),
+        (tetrahedron, [(100.0, (600.0,))], 1.0, 16_000, 30, 0.0),
+        (tetrahedron, [(-60.0, (1300.0,))], 2.0, 48_000, 25, 0.0),
         ("L of 1 m", [(50.0, (3000.0,))], 1.0, 48_000, 30, 0.0),
-        ("square of 4.57 cm", [(50.0, alarm)], 1.0, 16_000, 30, 0.0),
-        ("circle of 8, 20 cm", [(140.0, alarm)], 1.0, 48_000, 20, 0.0),
-        ("circle of 6, 9.3 cm", [(-75.0, (2000.0, 4000.0, 6000.0))], 1.0, 16_000, 30, 0.0),
-        ("square of 4.57 cm", [(153.0, (1200.0,)), (45.0, (2100.0,))], 2.0, 16_000, 30, 0.0),
-        ("circle of 8, 20 cm", [(0.0, (900.0,)), (120.0, (1300.0,))], 2.0, 16_000, 30, 0.0),
-        ("square of 4.57 cm", [(50.0, (1000.0,))], 0.2, 16_000, 30, 0.0),
-        ("square of 4.57 cm", [(50.0, (1500.0,))], 2.0, 16_000, 30, 0.2),
-        ("circle of 6, 9.3 cm", [(-40.0, (800.0,))], 2.0, 16_000, 30, 0.3),
-        ("circle of 8, 20 cm", [(110.0, (1100.0,))], 2.0, 16_000, 30, 0.4),
-        ("circle of 8, 20 cm", [(30.0, alarm)], 2.0, 16_000, 30, 0.3),
-    ]  # fmt: skip
+        (square, [(50.0, alarm)], 1.0, 16_000, 30, 0.0),
+        (eight, [(140.0, alarm)], 1.0, 48_000, 20, 0.0),
+        (six, [(-75.0, (2000.0, 4000.0, 6000.0))], 1.0, 16_000, 30, 0.0),
+        (square, [(153.0, (1200.0,)), (45.0, (2100.0,))], 2.0, 16_000, 30, 0.0),
+        (eight, [(0.0, (900.0,)), (120.0, (1300.0,))], 2.0, 16_000, 30, 0.0),
+        (square, [(50.0, (1000.0,))], 0.2, 16_000, 30, 0.0),
+        (square, [(50.0, (1500.0,))], 2.0, 16_000, 30, 0.2),
+        (six, [(-40.0, (800.0,))], 2.0, 16_000, 30, 0.3),
+        (eight, [(110.0, (1100.0,))], 2.0, 16_000, 30, 0.4),
+        (eight, [(30.0, alarm)], 2.0, 16_000, 30, 0.3),
+    ]
     return [
-        HearingCase(
-            f"{row[0]}, {'; '.join(f'{t} Hz from {b:g} deg' for b, t in row[1])}, "
-            f"{row[2]:g} s, {row[4]} dB, T60 {row[5]:g} s",
-            lambda row=row, seed=seed: _judge(*row, seed),
-        )
+        HearingCase(_name(row), partial(_judge, *row, seed))
         for seed, row in enumerate(rows)
     ]
+
+
+def _name(row: _Row) -> str:
+    array, sources, seconds, _, snr_db, t60_s = row
+    tones = "; ".join(
+        f"{' and '.join(f'{f:g}' for f in tones_hz)} Hz from {bearing:g} deg"
+        for bearing, tones_hz in sources
+    )
+    return f"{array}, {tones}, {seconds:g} s, {snr_db:g} dB, T60 {t60_s:g} s"
