@@ -39,6 +39,10 @@ _MOST_CALLS = 64
 # correlation at other lags.
 _STANDS_OUT = 5.0
 
+# Least coherence of two channels with the same call, after they are shifted by at most
+# _OFF samples from the lags. Parts of noise that happen to be loud have less.
+_LEAST_COHERENCE, _OFF = 0.25, 2
+
 # Largest error of the distances and of the speed of sound, in standard deviations.
 _DEVIATIONS = 4.0
 
@@ -171,7 +175,7 @@ class CallSearch:
         channels = sorted(whole)
         lags = np.array([whole[k] for k in channels])
         pieces = self._pieces(call, channels, lags)
-        power = np.mean(pieces**2, axis=1, keepdims=True)
+        power = np.mean(pieces**2, axis=1, keepdims=True) + np.finfo(np.float32).tiny
         size = fft.next_fast_len(2 * pieces.shape[1], real=True)
         spectra = fft.rfft(pieces / np.sqrt(power), size)
         f = fft.rfftfreq(size, 1.0 / self.sample_rate_hz)
@@ -270,22 +274,48 @@ class CallSearch:
                 row[max(0, a - 2) : a + 3].max(initial=0.0)
                 for row, a in zip(values, at, strict=True)
             ]
-            table += table.T
-            members = [0]
-            rest = set(range(1, n))
-            while rest:
-                k = max(rest, key=lambda k: table[k, members].mean())
-                if table[k, members].mean() < _STANDS_OUT:
-                    break
-                members.append(k)
-                rest.remove(k)
+            samples = np.rint(lags / _DENSITY).astype(np.int64)
+            alike = self._coherence(call, order, samples) > _LEAST_COHERENCE
+            table = np.where(alike, table + table.T, 0.0)
+            members = _agreeing(table)
             total = float(table[np.ix_(members, members)].sum())
             if total > score:
                 score = total
-                best = {
-                    int(order[k]): int(np.rint(lags[k] / _DENSITY)) for k in members[1:]
-                }
+                best = {order[k]: int(samples[k]) for k in members[1:]}
         return best
+
+    def _coherence(
+        self, call: Call, order: list[int], lags: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Returns the (n, n) coherences of the channels, shifted by the lags."""
+        pieces = self._pieces(call, order, lags)
+        size = fft.next_fast_len(2 * pieces.shape[1], real=True)
+        flat = _whitened(fft.rfft(pieces, size).astype(np.complex64))
+        flat /= np.linalg.norm(flat, axis=1, keepdims=True) + np.finfo(np.float32).tiny
+        turn = 2.0 * math.pi * np.arange(flat.shape[1]) / size
+        shifts = np.arange(-_OFF, _OFF + 1)
+        return np.asarray(
+            np.max(
+                [np.real(flat.conj() * np.exp(1j * turn * k) @ flat.T) for k in shifts],
+                axis=0,
+            )
+        )
+
+
+def _agreeing(table: NDArray[np.float64]) -> list[int]:
+    """Returns the channels that agree with channel 0, and on average with each other.
+
+    The (n, n) table has the correlation of each pair.
+    """
+    members, rest = [0], set(range(1, len(table)))
+    while rest:
+        means = {k: float(table[k, members].mean()) for k in rest}
+        best = max(rest, key=means.__getitem__)
+        if means[best] < _STANDS_OUT:
+            break
+        members.append(best)
+        rest.remove(best)
+    return members
 
 
 def _whitened(spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:

@@ -25,6 +25,7 @@ from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.recording_search import RecordingSearch
 from analysis.arrays.recording_spectra import RecordingSpectra
 from analysis.arrays.standing_sounds import sounding_band, standing_sound
+from analysis.arrays.tone_search import ToneSearch
 from systems.framework.input_error import InputError
 
 #: Numbers of snapshots per stretch to try, in this order. A faint or distant source
@@ -35,6 +36,9 @@ LEAST_SIGHTINGS = 3
 
 # Kinds of faults that make it impossible to locate a source.
 _FATAL = ("nan", "dead", "copied", "units", "drift")
+
+# Kinds of faults that follow from delays.
+_OF_DELAYS = ("drift", "geometry", "size", "swapped", "units")
 
 # Largest number of channels in one message.
 _MOST_NAMED = 8
@@ -107,6 +111,11 @@ def prepared_recording(
             band_hz=geometry.band or ((low, high) if low > LOWEST_HZ else None),
         )
     )
+    if any(f.kind in _OF_DELAYS for f in faults):
+        # Delays of tones are known except for whole periods.
+        tones = ToneSearch(spectra(channels), known)
+        if tones.are_most:
+            faults = [fault for fault in faults if fault.kind not in _OF_DELAYS]
     if not trusts_positions:
         faults = [fault for fault in faults if fault.kind != "swapped"]
     channels, faults = channels_without_faults(channels, faults, agreement, where)

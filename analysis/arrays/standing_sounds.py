@@ -29,8 +29,9 @@ _QUIET_TO_MEAN = -1.0 / math.log(1.0 - _QUIET)
 # cells. Noise exceeds it in fewer than one of 10^4 cells.
 _ABOVE = 3.5
 
-# Share of the cells with a sound that are outside the band of the sounds, at each end.
-_EDGE = 0.01
+# Share of the excess that is outside the band of the sounds, at each end. In a cell,
+# an excess above _MOST does not count.
+_EDGE, _MOST = 0.01, 101.0
 
 # Number of cells that are processed at once.
 _BLOCK = 4096
@@ -45,7 +46,8 @@ class StandingSound(NamedTuple):
     """(k,) power of the sound in steps of ``step`` samples, as a multiple of the noise
     in the same cells."""
     of_bins: NDArray[np.float64]
-    """(f,) number of the cells with a sound at each frequency."""
+    """(f,) excess at each frequency. A cell counts at most 100, so that a single loud
+    frequency does not count more than the other sounds."""
 
     @property
     def step(self) -> int:
@@ -90,7 +92,7 @@ def standing_sound(
             if sounding[row].any():
                 out[row * hop : row * hop + _CELL] += frame
     of_bins = np.zeros(f.size)
-    of_bins[inside] = loud.sum(axis=0)
+    of_bins[inside] = np.where(loud, np.clip(ratio, 1.0, _MOST) - 1.0, 0.0).sum(axis=0)
     excess = np.where(loud, np.maximum(ratio - 1.0, 0.0), 0.0).sum(axis=1)
     return StandingSound(out[hop : hop + channel.size], excess, of_bins)
 
@@ -98,9 +100,9 @@ def standing_sound(
 def sounding_band(
     sound: StandingSound, sample_rate_hz: float
 ) -> tuple[float, float] | None:
-    """Returns the band that contains nearly all cells with a sound, Hz.
+    """Returns the band that contains nearly all sound, Hz.
 
-    The result is None if there are no such cells.
+    The result is None if there is no sound.
     """
     cells = np.cumsum(sound.of_bins)
     if not cells[-1]:

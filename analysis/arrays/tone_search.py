@@ -41,6 +41,9 @@ _ABOVE, _AROUND, _MOST_LINES = 30.0, 12, 8
 # Least share of the power of a recording of tones that belongs to their lines.
 _OF_POWER = 0.25
 
+# Largest number of windows in which lines are looked for.
+_MOST_WINDOWS = 400
+
 # Lowest frequency of a line, as a share of the lowest frequency of the recording.
 _LOWEST = 0.5
 
@@ -100,13 +103,31 @@ class ToneSearch:
         whole = round(_WINDOW_S * self.recording.sample_rate_hz)
         return max(2, min(whole, round(_OF_SHORT * total)))
 
-    @cached_property
-    def _spectra(self) -> NDArray[np.complex64]:
-        """(n, windows, bins) spectra of windows that overlap by half."""
-        windows = np.lib.stride_tricks.sliding_window_view(
+    @property
+    def _windows(self) -> int:
+        """Number of windows, which overlap by half."""
+        total = self.recording.channels.shape[1]
+        return (total - self.size) // self._hop + 1
+
+    @property
+    def _hop(self) -> int:
+        return max(1, self.size // 2)
+
+    def _spectra(self, windows: NDArray[np.int64]) -> NDArray[np.complex64]:
+        """Returns the (n, k, bins) spectra of k windows."""
+        all_windows = np.lib.stride_tricks.sliding_window_view(
             self.recording.channels, self.size, axis=1
-        )[:, :: max(1, self.size // 2)]
-        return fft.rfft(windows * np.hanning(self.size).astype(np.float32), axis=2)
+        )
+        shape = np.hanning(self.size).astype(np.float32)
+        return fft.rfft(all_windows[:, windows * self._hop] * shape, axis=2)
+
+    @cached_property
+    def _power(self) -> NDArray[np.float64]:
+        """(bins,) mean power of windows from anywhere in the recording."""
+        count = min(self._windows, _MOST_WINDOWS)
+        chosen = np.linspace(0, self._windows - 1, count).round().astype(np.int64)
+        square = np.abs(self._spectra(chosen)) ** 2
+        return np.asarray(np.mean(square, axis=(0, 1), dtype=np.float64))
 
     @property
     def _bin_hz(self) -> float:
@@ -118,7 +139,7 @@ class ToneSearch:
         travel = _LEAST_TRAVELS * self.recording.travel_s
         if self.size < travel * self.recording.sample_rate_hz:
             return []
-        power = np.mean(np.abs(self._spectra) ** 2, axis=(0, 1))
+        power = self._power
         floor = median_filter(power, 2 * _AROUND + 1, mode="nearest")
         bins = np.arange(power.size)
         peak = power == np.maximum.reduce([np.roll(power, k) for k in range(-2, 3)])
@@ -133,7 +154,7 @@ class ToneSearch:
         """Whether much of the power within the band belongs to lines."""
         if not self.lines_hz:
             return False
-        power = np.mean(np.abs(self._spectra) ** 2, axis=(0, 1))
+        power = self._power
         low, high = self.recording.low_hz, self.recording.high_hz
         band = slice(round(_LOWEST * low / self._bin_hz), round(high / self._bin_hz))
         lines = [round(f / self._bin_hz) for f in self.lines_hz]
@@ -145,8 +166,8 @@ class ToneSearch:
     @cached_property
     def stretches(self) -> list[slice]:
         """Windows of each stretch."""
-        count = self._spectra.shape[1]
-        hop_s = 0.5 * self.size / self.recording.sample_rate_hz
+        count = self._windows
+        hop_s = self._hop / self.recording.sample_rate_hz
         parts = max(1, round(count * hop_s / _STRETCH_S))
         edges = np.linspace(0, count, parts + 1).round().astype(int).tolist()
         return [slice(a, b) for a, b in pairwise(edges)]
@@ -192,10 +213,11 @@ class ToneSearch:
         return tones
 
     def _lines(self, stretch: slice) -> Iterator[Line]:
-        rate = self.recording.sample_rate_hz
+        rate, hop = self.recording.sample_rate_hz, self._hop
+        spectra = self._spectra(np.arange(stretch.start, stretch.stop))
         for frequency in self.lines_hz:
             k = round(frequency / self._bin_hz)
-            values = self._spectra[:, stretch, k].astype(np.complex128)
+            values = spectra[:, :, k].astype(np.complex128)
             power = np.mean(np.abs(values) ** 2, axis=0)
             values = values[:, power > 0.1 * power.mean()]
             count, windows = values.shape
@@ -205,7 +227,6 @@ class ToneSearch:
             if coherence < _STEADY:
                 continue
             exact = _exact_hz(values[int(np.argmax(np.abs(vectors[:, -1])))])
-            hop = max(1, self.size // 2)
             turns = round(frequency * hop / rate - exact) + exact
             wave = vectors[:, -1]
             phase = np.angle(wave[1:] * wave[0].conj())

@@ -19,8 +19,8 @@ TITLE = "continuous tones"
 
 _C = 343.2
 
-# Array; bearing, deg, and frequencies, Hz, of each source; duration, s; sample rate, Hz;
-# signal to noise ratio, dB; reverberation time, s.
+# Array; bearing, deg, and frequencies, Hz, of each source; duration, s; sample rate,
+# Hz; signal to noise ratio, dB; reverberation time, s.
 _Row = tuple[str, list[tuple[float, tuple[float, ...]]], float, int, float, float]
 
 

