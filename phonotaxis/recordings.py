@@ -120,7 +120,7 @@ def locate(
     fault of the channels.
 
     Args:
-        recording: WAV or FLAC file with one channel per microphone, at 8-192 kHz. Or
+        recording: WAV or FLAC file with one channel per microphone, at 8-500 kHz. Or
             (n, samples) recorded samples, one row per microphone.
         geometry: Geometry of the microphones, the path of a geometry file, or a list of
             positions (x, y) or (x, y, z) in m. None: the robot's own array.
