@@ -57,7 +57,7 @@ def unclear_tone(search: ToneSearch, array: KnownArray) -> list[ChannelFault]:
 def _among_echoes(search: ToneSearch) -> list[ChannelFault]:
     names = ", ".join(f"{f:.0f}" for f in sorted(search.lines_hz[:_MOST_NAMED]))
     text = (
-        f"sound: a tone of {names} Hz, whose phases do not tell one direction, because "
+        f"sound: a tone of {names} Hz, whose phases fit no single direction, because "
         "echoes or errors of the positions disturb them; use a sound with more "
         "frequencies"
     )

@@ -69,7 +69,7 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         ("microphones: [[0, 1], [0, 0]]\n", "2 given.*at least 3"),
         ("microphones: [[0, 1], [0, 0], [0, 1]]\n", "1 and 3 are 0 mm apart"),
         ("microphones: [[0, .nan], [0, 0], [0, -0.4]]\n", "finite"),
-        ("microphones: [[0, 400], [0, 0], [0, -400]]\n", "800 m apart.*in m"),
+        ("microphones: [[0, 4000], [0, 0], [0, -4000]]\n", "8000 m apart.*in m"),
         (
             f"microphones: {[[0.01 * k, 0.0] for k in range(65)]}\n",
             "65 given; give at most 64",
