@@ -23,6 +23,9 @@ from systems.sound.array_shape import ArrayShape
 # Larger distances mean that the positions are not in meters.
 _LARGEST_M = 5_000.0
 
+# Largest standard deviation of positions, m, or the aperture if that is longer.
+_LARGEST_STD_M = 1.0
+
 # Largest coordinate of a microphone, m. Coordinates of maps have up to 10^7 m.
 _FARTHEST_M = 1e8
 
@@ -74,7 +77,7 @@ _Points2 = Annotated[tuple[_Point2, ...], Strict(False)]
 _Points3 = Annotated[tuple[_Point3, ...], Strict(False)]
 _Channels = Annotated[tuple[Annotated[int, Field(ge=0)], ...], Strict(False)]
 _Band = Annotated[tuple[Positive, Positive], Strict(False)]
-_PlaceStd = Annotated[float, Field(ge=0.0, le=100.0)]
+_PlaceStd = Annotated[float, Field(ge=0.0)]
 _PlaceStds = Annotated[tuple[_PlaceStd, ...], Strict(False)]
 _Row = Annotated[tuple[float, ...], Strict(False)]
 _Matrix = Annotated[tuple[_Row, ...], Strict(False)]
@@ -206,6 +209,11 @@ class ArrayGeometry(Parameters):
                 "position_std_m",
                 f"has {len(std)} values for {shape.count} microphones; give one "
                 "for all, or one for each",
+            )
+        most = max(_LARGEST_STD_M, shape.aperture_m)
+        if std is not None and np.max(std) > most:
+            raise InputError(
+                "position_std_m", f"is {np.max(std):g} m; give at most {most:g} m"
             )
         if covariance is not None:
             _check_covariance(covariance, shape)
