@@ -125,7 +125,7 @@ class ArrayGeometry(Parameters):
     """Air temperature, deg C."""
     band: _Band | None = None
     """Lowest and highest frequency of the sound, Hz. None: 300 Hz up to 15000 Hz or
-    0.45 times the sample rate, whichever is lower. If most of the sound is above 15000
+    0.45 times the sample rate, whichever is lower. If nearly all sound is above 15000
     Hz, or if the microphones are more than about 11 m apart, ``locate`` finds the band
     of the sound instead."""
     position_std_m: _PlaceStd | _PlaceStds | None = None

@@ -37,6 +37,9 @@ LEAST_SIGHTINGS = 3
 # Kinds of faults that make it impossible to locate a source.
 _FATAL = ("nan", "dead", "copied", "units", "drift")
 
+# Largest share of audible sound in a recording of ultrasound.
+_AUDIBLE = 0.05
+
 # Kinds of faults that follow from delays.
 _OF_DELAYS = ("drift", "geometry", "size", "swapped", "units")
 
@@ -135,7 +138,7 @@ def _band(
 ) -> tuple[float, float]:
     """Returns the band to use, Hz.
 
-    The default band leaves out ultrasound, unless most of the sound is ultrasound.
+    The default band leaves out ultrasound, unless nearly all sound is ultrasound.
     """
     low, high = usable_band(geometry.band, sample_rate_hz)
     top = TOP_OF_RATE * sample_rate_hz
@@ -152,7 +155,7 @@ def _band(
     step = sample_rate_hz / (2.0 * (sound.of_bins.size - 1))
     below = sound.of_bins[: math.ceil(HIGHEST_HZ / step)].sum()
     band = sounding_band(sound, sample_rate_hz)
-    if band is None or 2.0 * below > sound.of_bins.sum():
+    if band is None or below > _AUDIBLE * sound.of_bins.sum():
         return low, high
     first = max(low, band[0])
     return first, min(max(band[1], first + LEAST_BAND_HZ), top)
