@@ -37,8 +37,9 @@ LEAST_SIGHTINGS = 3
 # Kinds of faults that make it impossible to locate a source.
 _FATAL = ("nan", "dead", "copied", "units", "drift")
 
-# Largest share of audible sound in a recording of ultrasound.
-_AUDIBLE = 0.05
+# Largest share of audible sound in a recording of ultrasound, and least share of the
+# power of such a recording that belongs to its sounds.
+_AUDIBLE, _LEAST_SHARE = 0.05, 1e-4
 
 # Kinds of faults that follow from delays.
 _OF_DELAYS = ("drift", "geometry", "size", "swapped", "units")
@@ -155,7 +156,8 @@ def _band(
     step = sample_rate_hz / (2.0 * (sound.of_bins.size - 1))
     below = sound.of_bins[: math.ceil(HIGHEST_HZ / step)].sum()
     band = sounding_band(sound, sample_rate_hz)
-    if band is None or below > _AUDIBLE * sound.of_bins.sum():
+    kept = float(np.mean(sound.samples**2)) > _LEAST_SHARE * float(np.var(loudest))
+    if band is None or not kept or below > _AUDIBLE * sound.of_bins.sum():
         return low, high
     first = max(low, band[0])
     return first, min(max(band[1], first + LEAST_BAND_HZ), top)
