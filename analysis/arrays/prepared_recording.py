@@ -39,7 +39,7 @@ _FATAL = ("nan", "dead", "copied", "units", "drift")
 
 # Largest share of audible sound in a recording of ultrasound, and least share of the
 # power of such a recording that belongs to its sounds.
-_AUDIBLE, _LEAST_SHARE = 0.05, 1e-4
+_AUDIBLE, _LEAST_SHARE = 0.05, 0.02
 
 # Kinds of faults that follow from delays.
 _OF_DELAYS = ("drift", "geometry", "size", "swapped", "units")

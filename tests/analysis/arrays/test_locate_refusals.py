@@ -34,7 +34,7 @@ def test_recordings_that_cannot_be_used(tmp_path):
         write(tmp_path / "four.wav", np.stack([tone] * 4, axis=1)): (
             "has 4 channels.*robot's own array 3.*--geometry FILE"
         ),
-        write(tmp_path / "short.wav", three[:100]): "2.08 ms, too short.*at least 5.52 ms",
+        write(tmp_path / "short.wav", three[:100]): "2.08 ms.*at least 5.52 ms",
         write(tmp_path / "slow.wav", three, 4_000): "4000 Hz.*8000",
     }
     for path, says in faults.items():
