@@ -191,6 +191,13 @@ def open_sound(
     from systems.framework.input_error import InputError
 
     known = make_geometry(geometry)
+    if known.known.far_apart:
+        size = known.known.shape.aperture_m
+        raise InputError(
+            "geometry",
+            f"has recorders {size:.3g} m apart, too far for a live direction; locate "
+            "recordings with 'phonotaxis locate'",
+        )
     every = max(known.columns) + 1
     if sound is None:
         stream = open_card(

@@ -123,7 +123,7 @@ def locate(
     fault of the files and of the channels.
 
     Args:
-        recording: WAV or FLAC file with one channel per microphone, at 8-192 kHz. Or a
+        recording: WAV or FLAC file with one channel per microphone, at 8-500 kHz. Or a
             list of files whose channels together are those of the microphones, in
             their order. Or (n, samples) recorded samples, one row per microphone.
         geometry: Geometry of the microphones, the path of a geometry file, or a list of

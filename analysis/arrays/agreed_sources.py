@@ -49,7 +49,7 @@ _LEAST_AGREED, _LEAST_ESTIMATES = 1.0 / 3.0, 4
 _LEAST_OWN, _LEAST_OF_MAIN = 3, 0.25
 
 # Faults that do not change directions.
-_HARMLESS = ("clipped", "inverted")
+_HARMLESS = ("clipped", "inverted", "moves")
 
 
 class AgreedSources(NamedTuple):

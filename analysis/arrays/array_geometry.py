@@ -15,13 +15,23 @@ from analysis.arrays.array_budget import ArrayBudget
 from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
-from systems.framework.parameters import Parameters, Point, Positive
+from systems.framework.parameters import Parameters, Positive
 from systems.sound.acoustics import SOUND_SPEED_M_S, sound_speed
 from systems.sound.array_shape import ArrayShape
 
-# Largest distance between two microphones, m. Larger distances mean that the positions
-# are not in meters.
-_LARGEST_M = 30.0
+# Largest distance between two microphones, m. Sound takes 15 s over this distance.
+# Larger distances mean that the positions are not in meters.
+_LARGEST_M = 5_000.0
+
+# Largest standard deviation of positions, m, or the aperture if that is longer.
+_LARGEST_STD_M = 1.0
+
+# Largest coordinate of a microphone, m. Coordinates of maps have up to 10^7 m.
+_FARTHEST_M = 1e8
+
+# Least travel time of sound between recorders that are far apart, s. Beyond it, the
+# windows of a compact array, 32 ms, do not contain the same sound in all channels.
+_FAR_APART_S = 0.032
 
 # Largest number of microphones. The computing time grows with the number of pairs.
 _MOST_MICROPHONES = 64
@@ -30,11 +40,14 @@ LEAST_BAND_HZ = 500.0
 
 #: Default lowest frequency of a recording and of a live stream, Hz.
 LOWEST_HZ, LOWEST_LIVE_HZ = 300.0, 200.0
+#: Default lowest frequency of recorders that are far apart, Hz. Of distant sounds, low
+#: frequencies remain.
+LOWEST_FAR_APART_HZ = 60.0
 #: Default highest frequency, Hz. Lower frequencies suffice to find faults.
 HIGHEST_HZ, HIGHEST_FAULTS_HZ = 15_000.0, 8_000.0
-# Upper limit of a default band, as a share of the sample rate. Near half the sample
+#: Upper limit of a default band, as a share of the sample rate. Near half the sample
 # rate, the filters of recorders attenuate the sound.
-_TOP_OF_RATE = 0.45
+TOP_OF_RATE = 0.45
 
 # _PLACES_SHARE: default standard deviation of positions as a share of the aperture. It
 #   corresponds to a tape measure for a large array, and to a circuit board for a small
@@ -57,12 +70,14 @@ _ALTERNATIVES = (
     ("sound_speed_std", "temperature_std_c"),
 )
 
-_Point3 = Annotated[tuple[float, float, float], Strict(False)]
-_Points = Annotated[tuple[Point, ...], Strict(False)]
+_Coordinate = Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)]
+_Point2 = Annotated[tuple[_Coordinate, _Coordinate], Strict(False)]
+_Point3 = Annotated[tuple[_Coordinate, _Coordinate, _Coordinate], Strict(False)]
+_Points2 = Annotated[tuple[_Point2, ...], Strict(False)]
 _Points3 = Annotated[tuple[_Point3, ...], Strict(False)]
 _Channels = Annotated[tuple[Annotated[int, Field(ge=0)], ...], Strict(False)]
 _Band = Annotated[tuple[Positive, Positive], Strict(False)]
-_PlaceStd = Annotated[float, Field(ge=0.0, le=1.0)]
+_PlaceStd = Annotated[float, Field(ge=0.0)]
 _PlaceStds = Annotated[tuple[_PlaceStd, ...], Strict(False)]
 _Row = Annotated[tuple[float, ...], Strict(False)]
 _Matrix = Annotated[tuple[_Row, ...], Strict(False)]
@@ -84,6 +99,13 @@ class KnownArray:
     """Standard deviation of a channel's gain, dB."""
     largest_range_error: float = 0.2
     """Largest standard deviation of a reported range, as a share of the range."""
+    centroid_m: tuple[float, ...] | None = None
+    """Centroid of the microphones in the frame of the geometry file, m. None: zero."""
+
+    @property
+    def far_apart(self) -> bool:
+        """Whether the microphones are recorders more than about 11 m apart in air."""
+        return self.shape.max_delay(self.c) > _FAR_APART_S
 
 
 class ArrayGeometry(Parameters):
@@ -92,7 +114,7 @@ class ArrayGeometry(Parameters):
     The default positions are those of the robot's own array.
     """
 
-    microphones: _Points | _Points3 = ((0.0, 0.4), (0.0, 0.0), (0.0, -0.4))
+    microphones: _Points2 | _Points3 = ((0.0, 0.4), (0.0, 0.0), (0.0, -0.4))
     """Positions (x, y) or (x, y, z) of the microphones in the order of the channels, m.
     """
     channels: _Channels | None = None
@@ -103,7 +125,9 @@ class ArrayGeometry(Parameters):
     """Air temperature, deg C."""
     band: _Band | None = None
     """Lowest and highest frequency of the sound, Hz. None: 300 Hz up to 15000 Hz or
-    0.45 times the sample rate, whichever is lower."""
+    0.45 times the sample rate, whichever is lower. If nearly all sound is above 15000
+    Hz, or if the microphones are more than about 11 m apart, ``locate`` finds the band
+    of the sound instead."""
     position_std_m: _PlaceStd | _PlaceStds | None = None
     """Standard deviation of each coordinate of the microphones, m. Give one value for
     all microphones, or one value per microphone. None: 1 % of the aperture, but at
@@ -186,6 +210,11 @@ class ArrayGeometry(Parameters):
                 f"has {len(std)} values for {shape.count} microphones; give one "
                 "for all, or one for each",
             )
+        most = max(_LARGEST_STD_M, shape.aperture_m)
+        if std is not None and np.max(std) > most:
+            raise InputError(
+                "position_std_m", f"is {np.max(std):g} m; give at most {most:g} m"
+            )
         if covariance is not None:
             _check_covariance(covariance, shape)
 
@@ -214,6 +243,7 @@ class ArrayGeometry(Parameters):
             budget=ArrayBudget(of_places, self._speed_std(), self.delay_std_s),
             gain_std_db=self.gain_std_db,
             largest_range_error=self.largest_range_error,
+            centroid_m=tuple(np.mean(self.microphones, axis=0).tolist()),
         )
 
     def _of_places(self, shape: ArrayShape) -> NDArray[np.float64]:
@@ -271,7 +301,7 @@ def usable_band(
     highest_hz: float = HIGHEST_HZ,
 ) -> tuple[float, float]:
     """Returns the stated band, or the default band at a sample rate."""
-    return band_hz or (lowest_hz, min(highest_hz, _TOP_OF_RATE * sample_rate_hz))
+    return band_hz or (lowest_hz, min(highest_hz, TOP_OF_RATE * sample_rate_hz))
 
 
 def make_geometry(

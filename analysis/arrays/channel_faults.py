@@ -76,7 +76,7 @@ _LEAD = 0.1
 
 _Kind = Literal[
     "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
-    "units", "size", "late", "drift", "moves"
+    "units", "size", "late", "drift", "moves", "tone"
 ]  # fmt: skip
 
 
@@ -114,6 +114,9 @@ def find_channel_faults(
         return found
     readable = samples if use.size == len(samples) else samples[use]
     found += _copied(readable, use, sample_rate_hz, array)
+    # Levels at distant recorders differ, and a call reaches only some of them.
+    if array.far_apart:
+        return found
     band_hz = usable_band(band_hz, sample_rate_hz, highest_hz=HIGHEST_FAULTS_HZ)
     measured = correlate_pairs(readable, shape.max_delay(c), sample_rate_hz, band_hz)
     if measured is None:

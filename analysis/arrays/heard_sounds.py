@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_geometry import ArrayGeometry
+from analysis.arrays.call_search import CallSearch
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
     SNAPSHOTS,
@@ -77,9 +78,13 @@ def sightings_of(
         top_hz=top_hz,
         trusts_positions=False,
     )
+    known = geometry.known
+    if known.far_apart:
+        calls = CallSearch.of(recording, known).sightings()
+        return calls, [fault.message for fault in faults]
     found: list[Sighting] = []
     for snapshots in SNAPSHOTS:
-        search = RecordingSearch(recording, geometry.known.shape, geometry.c, snapshots)
+        search = RecordingSearch(recording, known.shape, known.c, snapshots)
         heard = list(search.sightings())
         found = max(found, heard, key=len)
         if len(found) >= min(LEAST_SIGHTINGS, len(search.stretches)):

@@ -9,9 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
+from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_faults import ChannelFault
 from analysis.arrays.far_field import locate_far_source
-from analysis.arrays.heard_sources import HeardSource, heard_sources
+from analysis.arrays.heard_calls import arrivals_alike, heard_calls
+from analysis.arrays.heard_sources import HeardSource, HeardSources, heard_sources
+from analysis.arrays.heard_tones import heard_tones, unclear_tone
 from analysis.arrays.locate_result import LocatedSource
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
@@ -27,6 +30,7 @@ from analysis.arrays.recording_spectra import (
 )
 from analysis.arrays.source_estimate import SourceEstimate
 from analysis.arrays.source_placement import has_place, place_source
+from analysis.arrays.tone_search import ToneSearch
 from analysis.arrays.wavefront_misfit import late_channel
 
 # Least agreement of the channels in a window, as a share of the agreement in the best
@@ -38,6 +42,12 @@ _SLACK = 4.0
 
 # Standard deviation of a bearing of which nothing is known, deg.
 _ANY_STD_DEG = 180.0 / math.sqrt(3.0)
+# _ULTRASOUND_HZ: lowest frequency of ultrasound, Hz.
+# _CALLS_S: least travel time of sound along an array whose calls are looked for singly,
+#   if nothing else is found, s.
+# _WIDEST: largest number of periods of sound along the array for a grid of positions.
+_ULTRASOUND_HZ, _CALLS_S, _WIDEST = 10_000.0, 0.005, 20_000.0
+
 
 # Faults that make channels appear late.
 _EXPLAINS_LATENESS = ("size", "near")
@@ -50,12 +60,19 @@ class HeardRecording(NamedTuple):
     """
 
     recording: RecordingSpectra
-    search: RecordingSearch
+    search: RecordingSearch | CallSearch | ToneSearch
     sightings: list[Sighting]
     """Delays of the stretches in which one source position stands out."""
     estimates: list[SourceEstimate]
     """Estimated source positions, for the sightings whose delays fit a position."""
     faults: list[ChannelFault]
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Band in use: that of the calls, or that of all snapshots."""
+        if isinstance(self.search, CallSearch):
+            return self.search.found_band_hz
+        return self.recording.low_hz, self.recording.high_hz
 
 
 def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource:
@@ -86,16 +103,21 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
         "position_std_m": known.budget.position_std,
         "delay_std_s": known.budget.delay_std,
         "largest_range_error": known.largest_range_error,
-        "band_hz": [spectra.low_hz, spectra.high_hz],
+        "band_hz": list(heard.band_hz),
         "sample_rate_hz": recorded.rate,
         "frame_s": search.stretch_s,
     }
-    sources = heard_sources(
-        spectra.channels,
-        shape,
-        known.c,
-        spectra.sample_rate_hz,
-        (spectra.low_hz, spectra.high_hz),
+    # No plane wave passes recorders far apart.
+    sources = (
+        HeardSources()
+        if known.far_apart
+        else heard_sources(
+            spectra.channels,
+            shape,
+            known.c,
+            spectra.sample_rate_hz,
+            (spectra.low_hz, spectra.high_hz),
+        )
     )
     return LocatedSource(
         array,
@@ -135,21 +157,48 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     recording, faults = prepared_recording(recorded, geometry)
     known = geometry.known
     search, sightings, estimates = _estimates(recording, known)
+    if isinstance(search, CallSearch):
+        faults += arrivals_alike(sightings, known)
+        return HeardRecording(recording, search, sightings, estimates, faults)
+    if isinstance(search, ToneSearch):
+        if not estimates:
+            faults += unclear_tone(search, known)
+        return HeardRecording(recording, search, sightings, estimates, faults)
     late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
     return HeardRecording(recording, search, sightings, estimates, faults)
 
 
-_Heard = tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]
+_Heard = tuple[
+    RecordingSearch | CallSearch | ToneSearch, list[Sighting], list[SourceEstimate]
+]
 
 
 def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
     """Locates each short sound of a recording, or else each stretch of time.
 
     If the recording does not mostly consist of short sounds, the stretches are the
-    shortest ones that give enough estimates.
+    shortest ones that give enough estimates. If the microphones are far apart, or if
+    the sound is ultrasound, each call is looked for in all channels instead.
     """
+    if array.far_apart or recording.low_hz > _ULTRASOUND_HZ:
+        calls = heard_calls(recording, array)
+        wide = recording.high_hz * recording.travel_s > _WIDEST
+        if calls[2] or wide or not recording.starts.size:
+            return calls
+    heard = _in_windows(recording, array)
+    if not heard[2]:
+        tones = heard_tones(recording, array)
+        if tones[0].are_most:
+            return tones
+    if not heard[2] and recording.travel_s > _CALLS_S:
+        return heard_calls(recording, array)
+    return heard
+
+
+def _in_windows(recording: RecordingSpectra, array: KnownArray) -> _Heard:
+    """Locates the source in windows that contain its sound in all channels."""
     sounds = [
         OnsetSpectra(
             recording.channels,
@@ -161,7 +210,7 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
         )
         for after_s in AFTER_S
     ]
-    if sounds[0].are_most:
+    if sounds[0].are_most and any(s.starts.size for s in sounds):
         return _clearest([_heard(s, array, snapshots=1) for s in sounds])
     best = None
     for snapshots in SNAPSHOTS:
@@ -201,5 +250,9 @@ def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _H
     )
     sightings = list(search.sightings())
     placed = ((s.t_s, place_source(s, array)) for s in sightings)
-    found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
+    found = [
+        SourceEstimate.of(t_s, at, array.centroid_m)
+        for t_s, at in placed
+        if at is not None
+    ]
     return search, sightings, found

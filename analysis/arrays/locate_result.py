@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
@@ -85,6 +86,7 @@ class LocatedSource:
             "range_systematic_m": usual(
                 [] if range_m is None else [e.range_systematic_m for e in main]
             ),
+            **_position([] if range_m is None else main),
             "number_of_sources": self.number_of_sources,
             "doubt": agreed.doubt,
             "observable": [name for name, value in told.items() if value is not None],
@@ -143,3 +145,20 @@ class LocatedSource:
             "tracks": [asdict(track) for track in self.agreed.tracks],
             "remarks": list(self.remarks),
         }
+
+
+def _position(estimates: Sequence[SourceEstimate]) -> dict[str, Any]:
+    """Returns the median position of estimates, and the covariance of a single one.
+
+    A larger number of estimates does not reduce the covariance, because the estimates
+    may have a common error.
+    """
+    placed = [e for e in estimates if e.position_m is not None]
+    if not placed:
+        return {"position_m": None, "position_covariance_m2": None}
+    covariance = np.median([e.position_covariance_m2 for e in placed], axis=0)
+    center = np.median([e.position_m for e in placed], axis=0)
+    return {
+        "position_m": center.tolist(),
+        "position_covariance_m2": covariance.tolist(),
+    }

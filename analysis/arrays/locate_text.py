@@ -26,7 +26,8 @@ def locate_text(result: LocatedSource) -> str:
     """Describes a result by a summary and one row per estimate."""
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
     if not result.estimates and not result.agreed.sources:
-        return f"{heard}: nothing to locate{_WHY_NOTHING}"
+        why = [f"; {f.message}" for f in result.faults if f.kind == "tone"]
+        return f"{heard}: nothing to locate{''.join(why) or _WHY_NOTHING}"
     lines = [heard, *_direction(result), _range(result), *_sources(result)]
     lines.append("")
     lines.append("    t/s" + "".join(f"  {name:>{w}}" for _, name, w, _ in _COLUMNS))

@@ -10,7 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_geometry import (
+    HIGHEST_HZ,
     LEAST_BAND_HZ,
+    LOWEST_FAR_APART_HZ,
+    LOWEST_HZ,
+    TOP_OF_RATE,
     ArrayGeometry,
     usable_band,
 )
@@ -21,6 +25,8 @@ from analysis.arrays.processed_channels import processed_channel
 from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.recording_search import RecordingSearch
 from analysis.arrays.recording_spectra import RecordingSpectra
+from analysis.arrays.standing_sounds import sounding_band, standing_sound
+from analysis.arrays.tone_search import ToneSearch
 from systems.framework.input_error import InputError
 
 #: Numbers of snapshots per stretch to try, in this order. A faint or distant source
@@ -31,6 +37,13 @@ LEAST_SIGHTINGS = 3
 
 # Kinds of faults that make it impossible to locate a source.
 _FATAL = ("nan", "dead", "copied", "units", "drift")
+
+# Largest share of audible sound in a recording of ultrasound, and least share of the
+# power of such a recording that belongs to its sounds.
+_AUDIBLE, _LEAST_SHARE = 0.05, 0.02
+
+# Kinds of faults that follow from delays.
+_OF_DELAYS = ("drift", "geometry", "size", "swapped", "units")
 
 # Largest number of channels in one message.
 _MOST_NAMED = 8
@@ -73,14 +86,16 @@ def prepared_recording(
     shape = known.shape
     whole = geometry.columns == tuple(range(len(samples)))
     channels = samples if whole else samples[list(geometry.columns)]
-    low, high = usable_band(geometry.band, rate)
+    low, high = _band(channels, geometry, float(rate))
     high = min(high, max(top_hz, low + LEAST_BAND_HZ))
 
     def spectra(channels: NDArray[np.float64]) -> RecordingSpectra:
         equal = np.empty(channels.shape, dtype=np.float32)
         for row, channel in zip(equal, channels, strict=True):
             row[:] = (channel - channel.mean()) / channel.std()
-        return RecordingSpectra(equal, float(rate), low, high, shape.max_delay(known.c))
+        levels = tuple(channels.std(axis=1).tolist())
+        travel_s = shape.max_delay(known.c)
+        return RecordingSpectra(equal, float(rate), low, high, travel_s, levels)
 
     def agreement(channels: NDArray[np.float64]) -> float:
         search = RecordingSearch(spectra(channels), shape, known.c, SNAPSHOTS[0])
@@ -90,24 +105,33 @@ def prepared_recording(
     if processed is not None:
         raise InputError("recording", f"{where}: {_not_of_a_microphone(*processed)}")
     drift = None
-    if trusts_positions:
+    if trusts_positions and not known.far_apart:
         drift = recording_drift(channels, float(rate), shape.p_AM, known.c)
     faults = [] if drift is None else [drift]
     # The delays of drifting channels fit no position, so no other check of delays
     # applies.
     if drift is None or drift.kind != "drift":
         faults += find_channel_faults(
-            channels, known, sample_rate_hz=float(rate), band_hz=geometry.band
+            channels,
+            known,
+            sample_rate_hz=float(rate),
+            band_hz=geometry.band or ((low, high) if low > LOWEST_HZ else None),
         )
+    if any(f.kind in _OF_DELAYS for f in faults):
+        # Delays of tones are known except for whole periods.
+        tones = ToneSearch(spectra(channels), known)
+        if tones.are_most:
+            faults = [fault for fault in faults if fault.kind not in _OF_DELAYS]
     if not trusts_positions:
         faults = [fault for fault in faults if fault.kind != "swapped"]
     channels, faults = channels_without_faults(channels, faults, agreement, where)
     recording = spectra(channels)
-    if not recording.starts.size:
+    if not recording.starts.size and not known.far_apart:
         raise InputError(
             "recording",
-            f"{where} has {channels.shape[1]} samples, fewer than one frame of "
-            f"{recording.window.size}; record longer",
+            f"{where} lasts {1e3 * channels.shape[1] / rate:.3g} ms, too short for an "
+            f"array of {shape.aperture_m:.3g} m; record at least "
+            f"{1e3 * recording.least_samples / rate:.3g} ms",
         )
     return recording, faults
 
@@ -118,6 +142,35 @@ def _not_of_a_microphone(channel: int, observation: str) -> str:
         "of the microphones in 'channels' ([1, 2, 3, 4] for a ReSpeaker with six "
         "channels)"
     )
+
+
+def _band(
+    channels: NDArray[np.float64], geometry: ArrayGeometry, sample_rate_hz: float
+) -> tuple[float, float]:
+    """Returns the band to use, Hz.
+
+    The default band leaves out ultrasound, unless nearly all sound is ultrasound.
+    """
+    low, high = usable_band(geometry.band, sample_rate_hz)
+    top = TOP_OF_RATE * sample_rate_hz
+    if geometry.band is not None:
+        return low, high
+    if geometry.known.far_apart:
+        return LOWEST_FAR_APART_HZ, top
+    if top <= HIGHEST_HZ:
+        return low, high
+    loudest = channels[int(np.argmax(np.nan_to_num(np.var(channels, axis=1))))]
+    if not np.isfinite(loudest).all():
+        return low, high
+    sound = standing_sound(loudest.astype(np.float32), sample_rate_hz, (low, top))
+    step = sample_rate_hz / (2.0 * (sound.of_bins.size - 1))
+    below = sound.of_bins[: math.ceil(HIGHEST_HZ / step)].sum()
+    band = sounding_band(sound, sample_rate_hz)
+    kept = float(np.mean(sound.samples**2)) > _LEAST_SHARE * float(np.var(loudest))
+    if band is None or not kept or below > _AUDIBLE * sound.of_bins.sum():
+        return low, high
+    first = max(low, band[0])
+    return first, min(max(band[1], first + LEAST_BAND_HZ), top)
 
 
 def channels_without_faults(

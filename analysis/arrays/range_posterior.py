@@ -23,8 +23,9 @@ from systems.framework.compiling import njit
 from systems.hearing.delay_fit import across
 from systems.sound.array_shape import ArrayShape
 
-#: Largest range, m. No array can measure larger ranges.
-FARTHEST_M = 30.0
+# Largest range: _FARTHEST_M, or this number of apertures if that is longer. No array
+# can measure larger ranges.
+_FARTHEST_M, _FARTHEST_APERTURES = 30.0, 10.0
 
 # _RANGES: number of ranges, at equal steps of their logarithm.
 # _ABOUT: further ranges around the most likely one, in standard deviations of the
@@ -34,6 +35,11 @@ _ABOUT = np.linspace(-5.0, 5.0, 31)
 
 _STEPS = 4
 _LEAST_OFF = 0.2
+
+
+def farthest_m(aperture_m: float) -> float:
+    """Returns the largest range that an array can measure, m."""
+    return max(_FARTHEST_M, _FARTHEST_APERTURES * aperture_m)
 
 
 class RangePosterior(NamedTuple):
@@ -80,7 +86,7 @@ def range_posterior(
     The (n - 1,) delays t_k - t_0 have the covariance of noise and reflections, s^2. The
     first estimate ``start`` is a (d,) direction, its inverse range, 1/m, and the
     standard deviation of the inverse range. More ranges are evaluated around this
-    estimate. The ranges reach from ``nearest_m`` to 30 m.
+    estimate. The ranges reach from ``nearest_m`` to ``farthest_m`` of the aperture.
     """
     u, w, w_std = start
     frame = (
@@ -99,8 +105,9 @@ def range_posterior(
         budget.delay_std,
         c,
     )
-    ranges = np.geomspace(FARTHEST_M, nearest_m, _RANGES)
-    close = 1.0 / np.clip(w + w_std * _ABOUT, 1.0 / FARTHEST_M, 1.0 / nearest_m)
+    farthest = farthest_m(shape.aperture_m)
+    ranges = np.geomspace(farthest, nearest_m, _RANGES)
+    close = 1.0 / np.clip(w + w_std * _ABOUT, 1.0 / farthest, 1.0 / nearest_m)
     ranges = np.unique(np.concatenate((ranges, close)))[::-1].copy()
     likelihood = _log_likelihood(kernel, frame.T @ u, ranges)
     density, ranges = np.exp(likelihood - likelihood.max())[::-1], ranges[::-1]

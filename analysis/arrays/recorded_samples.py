@@ -18,7 +18,7 @@ from systems.framework.input_error import InputError
 #: samples) recorded samples.
 Recording: TypeAlias = str | Path | Sequence[str | Path] | ArrayLike
 
-_RATES_HZ = (8_000, 192_000)
+_RATES_HZ = (8_000, 500_000)
 
 # Channels and microphones of a ReSpeaker with the firmware of six channels.
 _RESPEAKER = (6, 4)

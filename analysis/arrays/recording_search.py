@@ -87,6 +87,8 @@ class RecordingSearch:
     def stretches(self) -> list[slice]:
         """Snapshots of each stretch, as slices."""
         count = len(self.recording.starts)
+        if not count:
+            return []
         size = min(self.snapshots, count)
         firsts = range(0, count - size + 1, max(1, size // 2))
         return [slice(k, k + size) for k in firsts]
@@ -94,7 +96,7 @@ class RecordingSearch:
     @property
     def stretch_s(self) -> float:
         """Duration of a stretch, s."""
-        count = self.stretches[0].stop
+        count = self.stretches[0].stop if self.stretches else 1
         samples = self.recording.window.size + (count - 1) * self.recording.hop
         return samples / self.recording.sample_rate_hz
 

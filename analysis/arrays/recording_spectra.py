@@ -25,6 +25,9 @@ from scipy.ndimage import maximum_filter1d
 WINDOW_S = 0.032
 #: Least length of a window, as a multiple of the travel time of sound along the array.
 TRAVELS = 6.0
+# Least length of a recording: _LEAST_WINDOW_S in addition to a multiple of the travel
+# time.
+_LEAST_WINDOW_S, _LEAST_TRAVELS = 8e-4, 2.0
 # _QUIET: quantile of the power that counts as the level of the quiet snapshots.
 # _QUIET_TO_MEAN: ratio of the mean power of noise to the quantile _QUIET of its power.
 _QUIET = 0.1
@@ -86,6 +89,8 @@ class RecordingSpectra:
     high_hz: float
     travel_s: float
     """Longest travel time of sound between two microphones, s."""
+    levels: tuple[float, ...] | None = None
+    """Levels of the n channels as recorded, in any unit. None: equal levels."""
 
     @cached_property
     def window(self) -> NDArray[np.float32]:
@@ -94,7 +99,16 @@ class RecordingSpectra:
 
         seconds = max(WINDOW_S, TRAVELS * self.travel_s)
         size = fft.next_fast_len(math.ceil(seconds * self.sample_rate_hz), real=True)
+        # A short recording is a single snapshot.
+        if self.least_samples <= self.channels.shape[1] < size:
+            size = self.channels.shape[1]
         return hann(size, sym=False).astype(np.float32)
+
+    @property
+    def least_samples(self) -> int:
+        """Least number of samples of a recording in which delays can be measured."""
+        seconds = _LEAST_WINDOW_S + _LEAST_TRAVELS * self.travel_s
+        return math.ceil(seconds * self.sample_rate_hz)
 
     @property
     def hop(self) -> int:
@@ -148,6 +162,8 @@ class RecordingSpectra:
             np.mean(np.abs(self.spectra(slice(k, k + 256))) ** 2, axis=0)
             for k in range(0, self.starts.size, 256)
         ]
+        if not parts:
+            return np.zeros((0, self.angular_frequency.size), dtype=np.float32)
         return np.concatenate(parts)
 
     @cached_property

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from analysis.arrays.place_medians import wrapped_deg
 from analysis.arrays.source_placement import PlacedSource
 
@@ -38,14 +40,25 @@ class SourceEstimate:
     """Standard deviation of the range, m."""
     range_systematic_m: float | None
     """Part of the standard deviation of the range from errors of the array, m."""
+    position_m: tuple[float, ...] | None = None
+    """Position (x, y) or (x, y, z) in the frame of the geometry file, m. None if there
+    is no range."""
+    position_covariance_m2: tuple[tuple[float, ...], ...] | None = None
+    """Covariance of the position, including the errors of the array, m^2."""
 
     @classmethod
-    def of(cls, t_s: float, placed: PlacedSource) -> SourceEstimate:
+    def of(
+        cls,
+        t_s: float,
+        placed: PlacedSource,
+        centroid_m: tuple[float, ...] | None = None,
+    ) -> SourceEstimate:
         """Makes an estimate from a source position. Unmeasurable values become None.
 
         Args:
             t_s: Middle of the stretch, s from the start of the recording.
             placed: Source position in the frame of the array, m, and its errors.
+            centroid_m: Centroid of the microphones, m. None: zero.
 
         Returns:
             The estimate, with angles in deg and the range in m.
@@ -59,6 +72,7 @@ class SourceEstimate:
 
         bearing = degrees(fix.bearing, fix.bearing_std)
         ranged = fix.range_valid
+        origin = np.array(centroid_m or np.zeros(fix.p_AS.size))
         return cls(
             t_s=t_s,
             bearing_deg=None if bearing is None else wrapped_deg(bearing),
@@ -72,4 +86,8 @@ class SourceEstimate:
             range_m=fix.range if ranged else None,
             range_std_m=fix.range_std if ranged else None,
             range_systematic_m=systematic.range_std if ranged else None,
+            position_m=tuple((fix.p_AS + origin).tolist()) if ranged else None,
+            position_covariance_m2=tuple(map(tuple, fix.covariance.tolist()))
+            if ranged
+            else None,
         )

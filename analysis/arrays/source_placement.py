@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.arrays.aligned_delays import AlignedDelays
 from analysis.arrays.array_geometry import KnownArray
 from analysis.arrays.far_field import locate_far_source
-from analysis.arrays.range_posterior import FARTHEST_M, range_posterior
+from analysis.arrays.range_posterior import farthest_m, range_posterior
 from systems.hearing.multilateration import angles_of, locate_source
 from systems.hearing.source_fix import NEAREST_M, SourceFix
 from systems.sound.array_shape import ArrayShape
@@ -105,14 +105,14 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     if (
         near.range_valid
         and near.range >= NEAREST_M
-        and near.chi_square < _limit(shape.freedom)
+        and near.chi_square < chi_square_limit(shape.freedom)
         and near.chi_square < far.chi_square - _CURVED
     ):
         ranged = _marginal(near, tau, own, array)
         farthest = ranged.range + _CERTAINLY * ranged.range_std
         told = (
             ranged.range_std <= array.largest_range_error * ranged.range
-            and farthest < FARTHEST_M
+            and farthest < farthest_m(shape.aperture_m)
         )
         near = ranged if told else near
         systematic = _of_budget(near, own + allowed, allowed, shape, c)
@@ -129,7 +129,7 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     if lying:
         far, systematic = _level(far), _level(systematic)
     freedom = shape.freedom + (0 if lying else 1)
-    fits = far.chi_square < _limit(freedom)
+    fits = far.chi_square < chi_square_limit(freedom)
     return PlacedSource(far, systematic) if fits else None
 
 
@@ -250,7 +250,8 @@ def tolerance(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
     return reflected + _budget(u, 0.0, array)
 
 
-def _limit(freedom: int) -> float:
+def chi_square_limit(freedom: int) -> float:
+    """Returns the largest chi-square of delays that fit a source position."""
     freedom = max(freedom, 1)
     return freedom + _MISFIT_DEVIATIONS * math.sqrt(2.0 * freedom)
 

@@ -31,7 +31,7 @@ def test_recordings_that_cannot_be_used(tmp_path):
         write(tmp_path / "four.wav", np.stack([tone] * 4, axis=1)): (
             "has 4 channels.*robot's own array 3.*--geometry FILE"
         ),
-        write(tmp_path / "short.wav", three[:100]): "100 samples.*longer",
+        write(tmp_path / "short.wav", three[:100]): "2.08 ms.*at least 5.52 ms",
         write(tmp_path / "slow.wav", three, 4_000): "4000 Hz.*8000",
     }
     for path, says in faults.items():
@@ -75,7 +75,7 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         ("microphones: [[0, 1]]\n", "1 given.*at least 2"),
         ("microphones: [[0, 1], [0, 0], [0, 1]]\n", "1 and 3 are 0 mm apart"),
         ("microphones: [[0, .nan], [0, 0], [0, -0.4]]\n", "finite"),
-        ("microphones: [[0, 400], [0, 0], [0, -400]]\n", "800 m apart.*in m"),
+        ("microphones: [[0, 4000], [0, 0], [0, -4000]]\n", "8000 m apart.*in m"),
         (
             f"microphones: {[[0.01 * k, 0.0] for k in range(65)]}\n",
             "65 given; give at most 64",
