@@ -8,7 +8,7 @@ from analysis.arrays.array_geometry import KnownArray
 from analysis.arrays.call_placement import place_call
 from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_faults import ChannelFault
-from analysis.arrays.locate_result import SourceEstimate
+from analysis.arrays.source_estimate import SourceEstimate
 from analysis.arrays.recording_search import Sighting
 from analysis.arrays.recording_spectra import RecordingSpectra
 
