@@ -21,8 +21,9 @@ from analysis.arrays.voting.source_tracks import (
     TrackParameters,
     step_tracks,
 )
-from analysis.arrays.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_peaks import VotedSource, gather_sources
 from systems.framework.parameters import Parameters, Positive
+from systems.sound.array_shape import ArrayShape
 
 # _VOTES_S: least number of bins that vote for a source, per second of the window.
 # _LEAST_VOTES: least number of bins that vote for a source in any window.
@@ -31,6 +32,10 @@ _VOTES_S, _LEAST_VOTES = 20.0, 6.0
 # Factor for the error of a detection. Windows overlap, so consecutive detections have
 # similar errors.
 _OVERLAP = 1.5
+
+# Factor for the common error of a row's votes from 45 deg off its normal. The value is
+# from simulated rooms.
+_OF_ROWS = 5.0
 
 
 class ListenerParameters(Parameters):
@@ -113,7 +118,7 @@ def hear_sources(
         if memory.samples == end:
             t_s = end / rate
             recent = _between(memory.recent, t_s - parameters.window_s, math.inf)
-            sources, tracks = _tracked(recent, t_s, memory.tracks, parameters)
+            sources, tracks = _tracked(recent, t_s, memory.tracks, plan, parameters)
             found.append(sources)
             memory = replace(
                 memory, recent=recent, tracks=tracks, steps=memory.steps + 1
@@ -138,7 +143,7 @@ def follow_sources(
     for k in range(1, math.floor(seconds / parameters.step_s + 1e-9) + 1):
         t_s = k * parameters.step_s
         recent = _between(votes, t_s - parameters.window_s, t_s - late)
-        sources, memory = _tracked(recent, t_s, memory, parameters)
+        sources, memory = _tracked(recent, t_s, memory, plan, parameters)
         found.append(sources)
     return found
 
@@ -147,15 +152,30 @@ def _tracked(
     votes: DirectionVotes,
     t_s: float,
     memory: TrackMemory,
+    plan: VotePlan,
     parameters: ListenerParameters,
 ) -> tuple[TrackedSources, TrackMemory]:
     least = max(_LEAST_VOTES, _VOTES_S * parameters.window_s)
     detections = [
-        source._replace(bearing_std=_OVERLAP * source.bearing_std)
+        _detection(source, plan.shape)
         for source in gather_sources(votes, least_votes=least)
     ]
     told, memory = step_tracks(detections, t_s, memory, parameters.tracks)
     return TrackedSources(t_s, tuple(told)), memory
+
+
+def _detection(source: VotedSource, shape: ArrayShape) -> VotedSource:
+    """Returns a source with the errors of a single detection.
+
+    All reflections at a row have shorter delays than sound along the row, so they turn
+    bearings toward the normal of the row, the more the farther these are from it.
+    """
+    common = source.common_std
+    if shape.kind == "row" and shape.ahead is not None:
+        normal = math.atan2(shape.ahead[1], shape.ahead[0])
+        common *= math.hypot(1.0, _OF_ROWS * math.sin(2.0 * (source.bearing - normal)))
+    own = _OVERLAP * math.sqrt(source.own_variance)
+    return source._replace(bearing_std=math.hypot(own, common), common_std=common)
 
 
 def _between(votes: DirectionVotes, begin: float, end: float) -> DirectionVotes:

@@ -103,6 +103,9 @@ class SourceTrack:
     """Number of detections so far."""
     share: float
     """Mean share of the sound that its detections had in their steps, 0 to 1."""
+    common_std: float = 0.0
+    """Standard deviation of the error that is common to the latest detections, rad. The
+    filter does not reduce it, so it is not part of ``covariance``."""
 
     @property
     def confidence(self) -> float:
@@ -111,8 +114,8 @@ class SourceTrack:
 
     @property
     def bearing_std(self) -> float:
-        """Standard deviation of the bearing, rad."""
-        return math.sqrt(float(self.covariance[0, 0]))
+        """Standard deviation of the bearing, rad. It includes the common error."""
+        return math.hypot(math.sqrt(float(self.covariance[0, 0])), self.common_std)
 
 
 @dataclass(frozen=True)
@@ -244,7 +247,7 @@ def _hidden(
 def _scatter(track: SourceTrack, detection: VotedSource, p: TrackParameters) -> float:
     """Returns the variance of a detection relative to its track, rad^2."""
     rate_squared = track.rate**2 + float(track.covariance[1, 1])
-    return detection.bearing_std**2 + p.smear_s**2 * rate_squared
+    return detection.own_variance + p.smear_s**2 * rate_squared
 
 
 def _heard(
@@ -266,6 +269,7 @@ def _heard(
     elevation = detection.elevation
     if elevation is not None and track.elevation is not None:
         elevation = 0.7 * track.elevation + 0.3 * elevation
+    common_std = 0.7 * track.common_std + 0.3 * detection.common_std
     return replace(
         track,
         bearing=wrapped(track.bearing + float(gain[0]) * off),
@@ -277,6 +281,7 @@ def _heard(
         t_heard=t_s,
         hits=track.hits + 1,
         share=track.share + (detection.share - track.share) / (track.hits + 1),
+        common_std=common_std,
     )
 
 
@@ -291,7 +296,7 @@ def _born(detection: VotedSource, t_s: float) -> SourceTrack:
         identity=0,
         bearing=wrapped(detection.bearing),
         rate=0.0,
-        covariance=np.diag([detection.bearing_std**2, _RATE_STD**2]),
+        covariance=np.diag([detection.own_variance, _RATE_STD**2]),
         elevation=detection.elevation,
         sounding=_BORN,
         silent=0.0,
@@ -300,6 +305,7 @@ def _born(detection: VotedSource, t_s: float) -> SourceTrack:
         t_shared=-math.inf,
         hits=1,
         share=detection.share,
+        common_std=detection.common_std,
     )
 
 
