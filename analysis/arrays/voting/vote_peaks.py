@@ -55,7 +55,7 @@ _INDEPENDENT = 30.0
 # votes, 1/rad. Both this error and the square of the scatter are proportional to the
 # power of the reflections. The value is from simulated rooms with reverberation times
 # of 0.2-0.6 s.
-_COMMON = 2.3
+_COMMON = 3.0
 _LEAST_STD_RAD = math.radians(0.5)
 
 _STEPS = 4
