@@ -76,7 +76,8 @@ _LEAD = 0.1
 
 _Kind = Literal[
     "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
-    "units", "size", "late", "drift"
+    "units", "size", "late", "drift",
+    "reflector",
 ]  # fmt: skip
 
 

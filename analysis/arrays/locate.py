@@ -10,6 +10,7 @@ from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
 from analysis.arrays.channel_faults import ChannelFault
 from analysis.arrays.heard_sources import heard_sources
 from analysis.arrays.locate_result import LocatedSource, SourceEstimate
+from analysis.arrays.near_reflector import near_reflector
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
     SNAPSHOTS,
@@ -33,7 +34,7 @@ _CLEAR = 0.5
 _SLACK = 4.0
 
 # Faults that make channels appear late.
-_EXPLAINS_LATENESS = ("size", "near")
+_EXPLAINS_LATENESS = ("size", "near", "reflector")
 
 
 class HeardRecording(NamedTuple):
@@ -106,6 +107,9 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     recording, faults = prepared_recording(recorded, geometry)
     known = geometry.known
     search, sightings, estimates = _estimates(recording, known)
+    reflector = near_reflector(recording)
+    if reflector is not None:
+        faults.append(reflector)
     late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
