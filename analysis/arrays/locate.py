@@ -107,7 +107,8 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     recording, faults = prepared_recording(recorded, geometry)
     known = geometry.known
     search, sightings, estimates = _estimates(recording, known)
-    reflector = near_reflector(recording)
+    # A faulty channel has another spectrum than the others without any reflector.
+    reflector = None if faults else near_reflector(recording)
     if reflector is not None:
         faults.append(reflector)
     late = late_channel(sightings, known)
