@@ -12,14 +12,13 @@ reflections shift the bands differently.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.framework.compiling import njit
+from analysis.arrays.diffuse_sound import without_diffuse
+from analysis.arrays.phase_agreement import climb, sums
 
 _BANDS = 24
 _LEAST_BANDS = 4
@@ -32,9 +31,6 @@ _FLOOR = 1.0
 # grow by this share for each part of the sound that is not coherent. The value is from
 # simulated rooms with reverberation times of 0.15-0.6 s.
 _ECHO_ERROR = 1.0
-_STEPS = 12
-# The search ends if the steps are below this share of a quarter of the shortest period.
-_SETTLED = 1e-4
 _MOST_COHERENT = 0.9999
 
 
@@ -53,6 +49,9 @@ class AlignedDelays:
     agreement: float = field(default=0.0, kw_only=True)
     """Share of the sound that is in phase in two channels, with equal weights for all
     frequencies. It measures how well the delays explain the whole sound."""
+    diffuse_share: float = field(default=0.0, kw_only=True)
+    """Share of diffuse sound, such as reverberation, in the sound without the noise.
+    Its effect on the delays is removed."""
 
 
 def fit_aligned_delays(
@@ -60,6 +59,8 @@ def fit_aligned_delays(
     weights: NDArray[np.float32],
     angular_frequency: NDArray[np.float64],
     coarseness: float = 1.0,
+    *,
+    diffuse: NDArray[np.complex64] | None = None,
 ) -> AlignedDelays | None:
     """Estimates the delays that remain between channels after a rough alignment.
 
@@ -71,6 +72,8 @@ def fit_aligned_delays(
         angular_frequency: (f,) increasing angular frequencies, rad/s.
         coarseness: Possible error of the alignment, in tenths of the shortest period.
             If it exceeds 1, the search begins with the lower frequencies only.
+        diffuse: (p, f) coherence of sound from all directions between the p pairs of
+            aligned channels. None if there is no such sound.
 
     Returns:
         The delays and their errors. None if the channels do not agree on any delays.
@@ -91,29 +94,38 @@ def fit_aligned_delays(
     while coarseness > 1.0:
         low = (angular_frequency * coarseness < angular_frequency[-1]).astype(float)
         if (low * total).sum() > 0.1 * total.sum():
-            tau = _climb(cross, low, angular_frequency, tau)
+            tau = climb(cross, low, angular_frequency, tau)
         coarseness /= 2.0
-    tau = _climb(cross, even, angular_frequency, tau)
+    tau = climb(cross, even, angular_frequency, tau)
     gain = _coherence_gain(cross, total, angular_frequency, tau, edges)
     if not gain.any():
         return None
-    tau = _climb(cross, gain, angular_frequency, tau)
-    slope, curve, aligned = _sums(cross, gain, angular_frequency, tau, edges)
+    of_pairs, share = len(first), 0.0
+    whole = np.array([0, angular_frequency.size])
+    error = np.zeros(tau.size)
+    direct = cross
+    if diffuse is not None:
+        direct, share, error = without_diffuse(
+            cross, total, diffuse, angular_frequency, tau, edges
+        )
+    tau = climb(direct, gain, angular_frequency, tau)
+    slope, curve, _ = sums(direct, gain, angular_frequency, tau, edges)
     bands = np.count_nonzero(gain[edges[:-1]])
     if bands < _LEAST_BANDS or np.linalg.eigvalsh(curve)[0] <= 0.0:
         return None
     inverse = np.linalg.inv(curve)
     scatter = slope.T @ slope * bands / (bands - 1)
     scale = float(np.trace(inverse @ scatter)) / tau.size
-    coherence = float(aligned / (len(first) * (gain * total).sum()))
+    aligned = sums(cross, gain, angular_frequency, tau, whole)[2]
+    coherence = float(aligned / (of_pairs * (gain * total).sum()))
     echo = 1.0 + _ECHO_ERROR * (1.0 - min(coherence, 1.0))
-    whole = np.array([0, angular_frequency.size])
-    in_phase = _sums(cross, even, angular_frequency, tau, whole)[2]
+    in_phase = sums(cross, even, angular_frequency, tau, whole)[2]
     return AlignedDelays(
         tau=tau,
-        covariance=echo**2 * scale * inverse,
+        covariance=echo**2 * scale * inverse + np.outer(error, error),
         coherence=coherence,
-        agreement=float(in_phase / (len(first) * total.sum())),
+        agreement=float(in_phase / (of_pairs * total.sum())),
+        diffuse_share=share,
     )
 
 
@@ -142,75 +154,3 @@ def _coherence_gain(
     noise = 2.0 / np.sqrt(np.maximum(whole * len(first), 1.0))
     r[r < noise] = 0.0
     return np.repeat(r / (1.0 - r**2), np.diff(edges))
-
-
-def _climb(
-    cross: NDArray[np.complex128],
-    gain: NDArray[np.float64],
-    w: NDArray[np.float64],
-    tau: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Maximizes the agreement by Newton's method, at most a quarter period per step.
-
-    The period is that of the highest frequency with a weight.
-    """
-    top = w[np.flatnonzero(gain)[-1]]
-    limit = 0.5 * math.pi / top
-    edges = np.array([0, w.size])
-    for _ in range(_STEPS):
-        slope, curve, _ = _sums(cross, gain, w, tau, edges)
-        try:
-            step = np.linalg.solve(curve, slope[0])
-        except np.linalg.LinAlgError:
-            return tau
-        if slope[0] @ step <= 0.0:
-            return tau
-        step *= min(1.0, limit / np.abs(step).max())
-        tau = tau + step
-        if np.abs(step).max() < _SETTLED * limit:
-            break
-    return tau
-
-
-@njit(cache=True)
-def _sums(  # pragma: no cover  (compiled)
-    cross: Any, gain: Any, w: Any, tau: Any, edges: Any
-) -> tuple[Any, Any, float]:
-    """Computes the agreement of the channels and its derivatives.
-
-    The agreement is the sum over all pairs and frequencies of Re(cross e^(j w delay)).
-    The results are the (b, n - 1) slopes of the agreement in b bands with respect to
-    the delays, its (n - 1, n - 1) negative second derivative, and the agreement itself.
-    """
-    bands, count = edges.size - 1, tau.size + 1
-    slope = np.zeros((bands, count - 1))
-    curve = np.zeros((count - 1, count - 1))
-    agreement = 0.0
-    p = 0
-    for i in range(count):
-        for j in range(i + 1, count):
-            t = tau[j - 1] - (tau[i - 1] if i > 0 else 0.0)
-            bend = 0.0
-            for b in range(bands):
-                rise = 0.0
-                for k in range(edges[b], edges[b + 1]):
-                    if gain[k] == 0.0:
-                        continue
-                    angle = w[k] * t
-                    cosine, sine = math.cos(angle), math.sin(angle)
-                    z = cross[p, k]
-                    real = gain[k] * (z.real * cosine - z.imag * sine)
-                    imag = gain[k] * (z.real * sine + z.imag * cosine)
-                    agreement += real
-                    rise -= w[k] * imag
-                    bend += w[k] * w[k] * real
-                slope[b, j - 1] += rise
-                if i > 0:
-                    slope[b, i - 1] -= rise
-            curve[j - 1, j - 1] += bend
-            if i > 0:
-                curve[i - 1, i - 1] += bend
-                curve[i - 1, j - 1] -= bend
-                curve[j - 1, i - 1] -= bend
-            p += 1
-    return slope, curve, agreement

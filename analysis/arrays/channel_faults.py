@@ -76,7 +76,7 @@ _LEAD = 0.1
 
 _Kind = Literal[
     "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
-    "units", "size", "late", "drift", "moves", "tone"
+    "units", "size", "late", "drift", "moves", "tone", "reflector"
 ]  # fmt: skip
 
 

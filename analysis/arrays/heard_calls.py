@@ -8,9 +8,9 @@ from analysis.arrays.array_geometry import KnownArray
 from analysis.arrays.call_placement import place_call
 from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_faults import ChannelFault
-from analysis.arrays.source_estimate import SourceEstimate
 from analysis.arrays.recording_search import Sighting
 from analysis.arrays.recording_spectra import RecordingSpectra
+from analysis.arrays.source_estimate import SourceEstimate
 
 # Delays below this share of the longest possible delay are suspicious. In a compact
 # array, calls with such delays are not located, because something else is wrong.

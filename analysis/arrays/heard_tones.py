@@ -7,9 +7,9 @@ import math
 from analysis.arrays.array_geometry import KnownArray
 from analysis.arrays.channel_faults import ChannelFault
 from analysis.arrays.far_field import locate_far_source
-from analysis.arrays.source_estimate import SourceEstimate
 from analysis.arrays.recording_search import Sighting
 from analysis.arrays.recording_spectra import RecordingSpectra
+from analysis.arrays.source_estimate import SourceEstimate
 from analysis.arrays.source_placement import place_source
 from analysis.arrays.tone_search import Tone, ToneSearch
 

@@ -16,6 +16,7 @@ from analysis.arrays.heard_calls import arrivals_alike, heard_calls
 from analysis.arrays.heard_sources import HeardSource, HeardSources, heard_sources
 from analysis.arrays.heard_tones import heard_tones, unclear_tone
 from analysis.arrays.locate_result import LocatedSource
+from analysis.arrays.near_reflector import near_reflector
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
     SNAPSHOTS,
@@ -50,7 +51,7 @@ _ULTRASOUND_HZ, _CALLS_S, _WIDEST = 10_000.0, 0.005, 20_000.0
 
 
 # Faults that make channels appear late.
-_EXPLAINS_LATENESS = ("size", "near")
+_EXPLAINS_LATENESS = ("size", "near", "reflector")
 
 
 class HeardRecording(NamedTuple):
@@ -164,6 +165,10 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
         if not estimates:
             faults += unclear_tone(search, known)
         return HeardRecording(recording, search, sightings, estimates, faults)
+    # A faulty channel has another spectrum than the others without any reflector.
+    reflector = None if faults else near_reflector(recording)
+    if reflector is not None:
+        faults.append(reflector)
     late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)

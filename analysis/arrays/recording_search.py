@@ -115,10 +115,14 @@ class RecordingSearch:
     def diffuse_response(self) -> NDArray[np.float32]:
         """(g,) response of each grid position to equal sound from all directions."""
         weights = self.recording.weights.mean(axis=0, dtype=np.float64)
-        phase = np.outer(self.shape.distances_m, self.recording.angular_frequency)
-        share = weights / max(weights.sum(), 1e-30)
-        cross = np.sinc(phase / (math.pi * self.c)) * share
+        cross = self.diffuse_coherence * (weights / max(weights.sum(), 1e-30))
         return self._responses(cross.astype(np.complex64))
+
+    @cached_property
+    def diffuse_coherence(self) -> NDArray[np.float64]:
+        """(p, f) coherence of equal sound from all directions between the pairs."""
+        phase = np.outer(self.shape.distances_m, self.recording.angular_frequency)
+        return np.sinc(phase / (math.pi * self.c))
 
     def mean_response(self) -> float:
         """Computes the weighted mean of the greatest responses of all stretches.
@@ -262,11 +266,15 @@ class RecordingSearch:
         """Estimates delays after shifting the channels by (n,) given delays, s."""
         rate = self.recording.sample_rate_hz
         lags = np.rint(later * rate).astype(np.int64)
+        w = self.recording.angular_frequency
+        first, second = self.shape.pairs.T
+        aligned = np.exp(1j * np.outer(lags[second] - lags[first], w / rate))
         fit = fit_aligned_delays(
             self.recording.spectra(stretch, lags),
             self.recording.weights[stretch],
-            self.recording.angular_frequency,
+            w,
             coarseness,
+            diffuse=(self.diffuse_coherence * aligned).astype(np.complex64),
         )
         return fit and replace(fit, tau=fit.tau + (lags[1:] - lags[0]) / rate)
 

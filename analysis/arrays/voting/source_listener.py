@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from analysis.arrays.voting.direction_votes import VoteMemory, VotePlan, cast_votes
 from analysis.arrays.voting.source_tracks import TrackMemory, step_tracks
 from analysis.arrays.voting.track_state import SourceTrack, TrackParameters
-from analysis.arrays.voting.vote_peaks import gather_turning
+from analysis.arrays.voting.vote_peaks import VotedSource, gather_turning
 from analysis.arrays.voting.vote_records import DirectionVotes, join_votes
 from systems.framework.parameters import Parameters, Positive
+from systems.sound.array_shape import ArrayShape
 
 # _VOTES_S: least number of bins that vote for a source, per second of the window.
 # _LEAST_VOTES: least number of bins that vote for a source in any window.
@@ -31,6 +32,10 @@ _LEAST_BINS, _FITTING_S = 30, 5.0
 # Factor for the error of a detection. Windows overlap, so consecutive detections have
 # similar errors.
 _OVERLAP = 1.5
+
+# Factor for the common error of a row's votes from 45 deg off its normal. The value is
+# from simulated rooms.
+_OF_ROWS = 4.0
 
 
 class ListenerParameters(Parameters):
@@ -128,7 +133,7 @@ def hear_sources(
         if memory.samples == end:
             t_s = end / rate
             recent = _between(memory.recent, t_s - parameters.window_s, math.inf)
-            sources, tracks = _tracked(recent, t_s, memory.tracks, parameters)
+            sources, tracks = _tracked(recent, t_s, memory.tracks, plan, parameters)
             found.append(sources)
             memory = replace(
                 memory, recent=recent, tracks=tracks, steps=memory.steps + 1
@@ -153,7 +158,7 @@ def follow_sources(
     for k in range(1, math.floor(seconds / parameters.step_s + 1e-9) + 1):
         t_s = k * parameters.step_s
         recent = _between(votes, t_s - parameters.window_s, t_s - late)
-        sources, memory = _tracked(recent, t_s, memory, parameters)
+        sources, memory = _tracked(recent, t_s, memory, plan, parameters)
         found.append(sources)
     return found
 
@@ -172,11 +177,12 @@ def _tracked(
     votes: DirectionVotes,
     t_s: float,
     memory: _Tracking,
+    plan: VotePlan,
     parameters: ListenerParameters,
 ) -> tuple[TrackedSources, _Tracking]:
     least = max(_LEAST_VOTES, _VOTES_S * parameters.window_s)
     detections = [
-        source._replace(bearing_std=_OVERLAP * source.bearing_std)
+        _detection(source, plan.shape)
         for source in gather_turning(
             votes, t_s - 0.5 * parameters.window_s, least_votes=least
         )
@@ -186,6 +192,20 @@ def _tracked(
     of_step = votes.group_fits.sum(axis=0) * parameters.step_s / parameters.window_s
     fits = math.exp(-parameters.step_s / _FITTING_S) * memory.fits + of_step
     return TrackedSources(t_s, tuple(told), are_unfit(fits)), _Tracking(tracks, fits)
+
+
+def _detection(source: VotedSource, shape: ArrayShape) -> VotedSource:
+    """Returns a source with the errors of a single detection.
+
+    All reflections at a row have shorter delays than sound along the row, so they turn
+    bearings toward the normal of the row, the more the farther these are from it.
+    """
+    common = source.common_std
+    if shape.kind == "row" and shape.ahead is not None:
+        normal = math.atan2(shape.ahead[1], shape.ahead[0])
+        common *= math.hypot(1.0, _OF_ROWS * math.sin(2.0 * (source.bearing - normal)))
+    own = _OVERLAP * math.sqrt(source.own_variance)
+    return source._replace(bearing_std=math.hypot(own, common), common_std=common)
 
 
 def _between(votes: DirectionVotes, begin: float, end: float) -> DirectionVotes:

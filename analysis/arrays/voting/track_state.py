@@ -108,6 +108,9 @@ class SourceTrack:
     """Number of detections so far."""
     share: float
     """Mean share of the sound that its detections had in their steps, 0 to 1."""
+    common_std: float = 0.0
+    """Standard deviation of the error that is common to the latest detections, rad. The
+    filter does not reduce it, so it is not part of ``covariance``."""
 
     @property
     def confidence(self) -> float:
@@ -116,8 +119,8 @@ class SourceTrack:
 
     @property
     def bearing_std(self) -> float:
-        """Standard deviation of the bearing, rad."""
-        return math.sqrt(float(self.covariance[0, 0]))
+        """Standard deviation of the bearing, rad. It includes the common error."""
+        return math.hypot(math.sqrt(float(self.covariance[0, 0])), self.common_std)
 
 
 def apart_rad(first: SourceTrack | VotedSource, second: SourceTrack) -> float:
@@ -166,7 +169,7 @@ def predicted(
 def scatter(track: SourceTrack, detection: VotedSource, p: TrackParameters) -> float:
     """Returns the variance of a detection relative to its track, rad^2."""
     rate_squared = track.rate**2 + float(track.covariance[1, 1])
-    return detection.bearing_std**2 + p.smear_s**2 * rate_squared
+    return detection.own_variance + p.smear_s**2 * rate_squared
 
 
 def heard(
@@ -209,6 +212,7 @@ def heard(
         t_heard=t_s,
         hits=track.hits + 1,
         share=track.share + (detection.share - track.share) / (track.hits + 1),
+        common_std=0.7 * track.common_std + 0.3 * detection.common_std,
     )
 
 
@@ -226,7 +230,7 @@ def born(detection: VotedSource, t_s: float) -> SourceTrack:
         identity=0,
         bearing=wrapped(detection.bearing),
         rate=detection.rate,
-        covariance=np.diag([detection.bearing_std**2, rate_std**2]),
+        covariance=np.diag([detection.own_variance, rate_std**2]),
         elevation=detection.elevation,
         sounding=_BORN,
         silent=0.0,
@@ -235,4 +239,5 @@ def born(detection: VotedSource, t_s: float) -> SourceTrack:
         t_shared=-math.inf,
         hits=1,
         share=detection.share,
+        common_std=detection.common_std,
     )

@@ -49,9 +49,14 @@ _AGREED = 0.5
 # Least number of steered votes in total. Fewer votes may be random.
 _LEAST_STEERED = 3
 
-# Largest number of votes of a source that count as independent. Reflections cause
-# common errors of more votes.
+# Largest number of votes of a source that count as independent.
 _INDEPENDENT = 30.0
+
+# Error that reflections cause in all votes together, per square of the scatter of the
+# votes, 1/rad. Both this error and the square of the scatter are proportional to the
+# power of the reflections. The value is from simulated rooms with reverberation times
+# of 0.2-0.6 s.
+_COMMON = 3.0
 _LEAST_STD_RAD = math.radians(0.5)
 
 # _RATES: rates of bearings to try, rad/s. Neighbors turn the votes of half a second by
@@ -79,8 +84,8 @@ class VotedSource(NamedTuple):
     bearing: float
     """Bearing, in (-pi, pi], rad."""
     bearing_std: float
-    """Standard deviation of the bearing from the scatter of the votes, rad. At most 30
-    votes count as independent."""
+    """Standard deviation of the bearing from the scatter of the votes and from the
+    error common to all votes, rad. At most 30 votes count as independent."""
     elevation: float | None
     """Median elevation of the votes, rad. None if the array cannot measure it."""
     elevation_std: float | None
@@ -99,6 +104,14 @@ class VotedSource(NamedTuple):
     has at least three times the required number of votes."""
     rate: float = 0.0
     """Rate of the bearing, rad/s. It is 0 unless the source turns fast."""
+    common_std: float = 0.0
+    """Part of ``bearing_std`` from reflections that move all votes alike, rad. It is
+    about the same in consecutive spans of time."""
+
+    @property
+    def own_variance(self) -> float:
+        """Variance of the bearing without the common error, rad^2."""
+        return max(self.bearing_std**2 - self.common_std**2, 0.0)
 
 
 def gather_sources(
@@ -273,11 +286,12 @@ def _source(
     off = wrapped(a - bearing)
     spread = math.sqrt(float(w @ off**2) / float(w.sum()))
     std = spread / math.sqrt(min(float(a.size), _INDEPENDENT))
+    common = _COMMON * spread**2
     heights = votes.elevation[mine]
     measured = bool(np.isfinite(heights).all())
     return VotedSource(
         bearing=float(wrapped(bearing)),
-        bearing_std=math.hypot(std, _LEAST_STD_RAD),
+        bearing_std=math.hypot(std, _LEAST_STD_RAD, common),
         elevation=float(np.median(heights)) if measured else None,
         elevation_std=_scatter(heights) if measured else None,
         share=float(w.sum()) / whole,
@@ -285,6 +299,7 @@ def _source(
         rises=float(votes.rises[mine].mean()),
         votes=count,
         confidence=0.0,
+        common_std=common,
     )
 
 
