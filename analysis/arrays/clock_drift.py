@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.stats import theilslopes
 
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from systems.delays.correlations import correlations_at_lags
 
 #: Length of a stretch, s. If clocks differ by 100 ppm, they drift by 50 us in this

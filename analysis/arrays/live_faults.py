@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_geometry import ArrayGeometry
-from analysis.arrays.channel_faults import ChannelFault, find_channel_faults
+from analysis.arrays.channel_fault import ChannelFault
+from analysis.arrays.channel_faults import find_channel_faults
 from analysis.arrays.clock_drift import STRETCH_S, clock_drift, common_lags
 
 # _CLIPPED: magnitude that counts as full scale.

@@ -16,7 +16,7 @@ from analysis.arrays.array_geometry import (
     ArrayGeometry,
     usable_band,
 )
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.live_faults import LiveFaults
 from analysis.arrays.prepared_recording import chosen_microphones
 from analysis.arrays.recorded_samples import array_mismatch

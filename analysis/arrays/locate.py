@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.heard_sources import heard_sources
 from analysis.arrays.locate_result import LocatedSource, SourceEstimate
 from analysis.arrays.prepared_recording import (
@@ -32,8 +32,8 @@ _CLEAR = 0.5
 # Largest error of the distances between microphones, in standard deviations.
 _SLACK = 4.0
 
-# Faults that make channels appear late.
-_EXPLAINS_LATENESS = ("size", "near")
+# Faults that make channels appear late, or leave out channels.
+_EXPLAINS_LATENESS = ("size", "near", "dead", "slipped")
 
 
 class HeardRecording(NamedTuple):
@@ -49,6 +49,8 @@ class HeardRecording(NamedTuple):
     estimates: list[SourceEstimate]
     """Estimated source positions, for the sightings whose delays fit a position."""
     faults: list[ChannelFault]
+    geometry: ArrayGeometry
+    """The array without the microphones that are left out."""
 
 
 def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource:
@@ -66,6 +68,7 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
             remedy.
     """
     heard = hear(recorded, geometry)
+    geometry = heard.geometry
     known, spectra, search = geometry.known, heard.recording, heard.search
     shape = known.shape
     array = {
@@ -103,13 +106,13 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
 
 def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     """Finds the delays and positions of the source in a recording in memory."""
-    recording, faults = prepared_recording(recorded, geometry)
-    known = geometry.known
+    recording, faults, used = prepared_recording(recorded, geometry)
+    known = used.known
     search, sightings, estimates = _estimates(recording, known)
-    late = late_channel(sightings, known)
-    if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
-        faults.append(late)
-    return HeardRecording(recording, search, sightings, estimates, faults)
+    if not any(f.kind in _EXPLAINS_LATENESS for f in faults):
+        late = late_channel(sightings, known)
+        faults += [] if late is None else [late]
+    return HeardRecording(recording, search, sightings, estimates, faults, used)
 
 
 _Heard = tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.heard_sources import HeardSource, HeardSources
 from analysis.arrays.recording_search import MAD_TO_STD
 from analysis.arrays.source_placement import PlacedSource

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.arrays.array_geometry import ArrayGeometry
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.prepared_recording import (
     channels_without_faults,
     chosen_microphones,
@@ -80,7 +80,7 @@ def test_all_channels_that_are_of_no_use_are_named():
 
 def test_a_message_names_a_few_of_many_channels():
     found = [fault("copied", 0, k) for k in range(1, 64)]
-    with pytest.raises(ValueError, match=r"check channels 1, 3, 4, .*\.\.\.") as caught:
+    with pytest.raises(ValueError, match=r"check channels 3, 4, .*\.\.\.") as caught:
         channels_without_faults(SAMPLES, found, AS_GIVEN, "")
     assert len(str(caught.value)) < 100
 
