@@ -163,8 +163,8 @@ def slipping_channels(delays: ChannelDelays, search: LagSearch) -> ChannelFault 
         "slipped",
         tuple(channels),
         f"{channel_names(channels)}: {samples} sample{'s' * (samples > 1)} "
-        f"({1e3 * abs(step):.3g} ms) {what} at {0.5 * (first + last):.1f} s; record "
-        "again, or use only the part before or after",
+        f"({1e3 * abs(step):.3g} ms) {what} at {0.5 * (first + last):.1f} s; check "
+        "the recorder, or use only the part before or after",
     )
 
 
@@ -230,6 +230,10 @@ def _jump_at(split: int, delays: ChannelDelays, search: LagSearch) -> _Jump | No
     i, j = pairs.T
     # Changes of the second group against the first one.
     across = known & (first[i] != first[j])
+    inside = np.abs(before) <= search.allowed_s
+    if not across.any() or not np.all(inside[across]):
+        # The channel was late before, or it heard an echo.
+        return None
     steps = np.where(first[i], change, -change)[across]
     step = float(np.median(steps))
     significance = abs(step) / float(np.median(std[across]))

@@ -42,11 +42,19 @@ _DEAD_DB = 30.0
 _NEAR_DB = 15.0
 _GAIN_DEVIATIONS = 5.0
 
-# Omnidirectional microphones with equal gains hear a distant source at equal levels. A
-# difference of more than this many dB, and of this many standard deviations of the
-# gain, means directional microphones: between an inverted channel and the median of the
-# others, and between the faintest channel and the loudest one.
-_INVERTED_DB, _SPREAD_DB, _SPREAD_DEVIATIONS = 6.0, 10.0, 4.0
+# Omnidirectional microphones with equal gains hear a distant source at equal levels.
+# Directional microphones are likely if the levels differ by more than a number of
+# standard deviations of the gain: levels of inverted or late channels from those of the
+# others, and the highest from the lowest level.
+_DIFFERS, _SPREAD = 1.5, 4.0
+
+# A microphone that points away from the source may hear an echo instead of the direct
+# sound. The strongest echo arrives within this time, s.
+_ECHO_S = 0.03
+
+_OR_WIRES = (
+    "directional microphones? Use omnidirectional ones, or exchange the wires of these"
+)
 
 # _LEAST_PILE: least number of samples of a clipped channel at an extreme value.
 # _CLIPPED_SHARE: least share of the samples of a clipped channel at an extreme value.
@@ -96,10 +104,10 @@ def find_channel_faults(
         search = LagSearch.of(array, sample_rate_hz, band_hz, use[heard].tolist())
         late = unaligned_channels(readable[heard], search)
         if late is not None:
-            return [*found, late]
+            return [*found, _late_or_echo(late, measured, use, array.gain_std_db)]
     found += strangers(measured, use, shape)
     dead = {k for fault in found if fault.kind == "dead" for k in fault.channels}
-    inverted = _inverted(measured, use, dead)
+    inverted = _inverted(measured, use, dead, array.gain_std_db)
     found += inverted
     if use.size < shape.count or dead or any(f.kind == "near" for f in found):
         return found
@@ -201,7 +209,10 @@ def _levels(
 
 
 def _inverted(
-    measured: PairCorrelations, use: NDArray[np.int64], dead: set[int]
+    measured: PairCorrelations,
+    use: NDArray[np.int64],
+    dead: set[int],
+    gain_std_db: float,
 ) -> list[ChannelFault]:
     """Finds channels that have negative correlations with most other channels."""
     high, low = measured.pooled_highest, -measured.pooled_lowest
@@ -224,30 +235,48 @@ def _inverted(
     )
     # The sign of a channel without any sound in common with the others is arbitrary.
     negative = np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
-    level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
-    faint = level[negative] < np.median(np.delete(level, negative)) - _INVERTED_DB
-    if negative.size and faint.all():
-        return [_directional(use[negative].tolist())]
+    louder = _louder_db(measured, negative) if negative.size else 0.0
+    if abs(louder) > _DIFFERS * gain_std_db:
+        channels = use[negative].tolist()
+        seen = f"inverted, and {_louder(louder)} than the others"
+        text = f"{channel_names(channels)}: {seen}; {_OR_WIRES}"
+        return [ChannelFault("directional", tuple(channels), text)]
     return [_of_channel("inverted", int(use[k]), text) for k in negative]
 
 
-def _directional(channels: list[int]) -> ChannelFault:
-    """Returns the fault of microphones that hear the source with a rear lobe."""
-    text = (
-        "fainter than the others and inverted; directional microphones that point away "
-        "from the source? Use omnidirectional ones, or leave these out of the geometry"
-    )
-    named = channel_names(channels)
-    return ChannelFault("directional", tuple(channels), f"{named}: {text}")
+def _louder_db(measured: PairCorrelations, chosen: NDArray[np.int64]) -> float:
+    """Returns the mean level of the chosen channels relative to the others, dB."""
+    level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
+    return float(level[chosen].mean() - np.delete(level, chosen).mean())
+
+
+def _louder(by_db: float) -> str:
+    return f"{abs(by_db):.0f} dB {'louder' if by_db > 0.0 else 'fainter'}"
+
+
+def _late_or_echo(
+    late: ChannelFault,
+    measured: PairCorrelations,
+    use: NDArray[np.int64],
+    gain_std_db: float,
+) -> ChannelFault:
+    """Adds another cause to a fault of late channels if these are also fainter."""
+    louder = _louder_db(measured, np.flatnonzero(np.isin(use, late.channels)))
+    differs = abs(louder) > _DIFFERS * gain_std_db
+    if not differs or late.seconds > _ECHO_S:
+        return late
+    seen, _, remedy = late.message.partition("; ")
+    cause = "directional microphones that hear an echo? If not,"
+    text = f"{seen}, and {_louder(louder)}; {cause} {remedy}"
+    return ChannelFault("directional", (), text)
 
 
 def _not_of_directivity(
     faults: list[ChannelFault], measured: PairCorrelations, gain_std_db: float
 ) -> list[ChannelFault]:
     """Replaces faults of the geometry if unequal levels have another explanation."""
-    level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
-    spread = float(np.ptp(level))
-    if spread < max(_SPREAD_DB, _SPREAD_DEVIATIONS * gain_std_db):
+    spread = float(np.ptp(20.0 * np.log10(np.maximum(measured.level, 1e-300))))
+    if spread < _SPREAD * gain_std_db:
         return faults
     text = (
         f"recording: the delays fit no source, and the levels differ by {spread:.0f} "

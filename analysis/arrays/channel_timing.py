@@ -163,9 +163,17 @@ class LagSearch:
         return np.where(heard, lags, np.nan)
 
 
+@dataclass(frozen=True)
+class LateChannels(ChannelFault):
+    """A fault of channels that are not aligned in time with the others."""
+
+    seconds: float
+    """Smallest difference in time between two groups of channels, s."""
+
+
 def unaligned_channels(
     samples: NDArray[np.float64], search: LagSearch
-) -> ChannelFault | None:
+) -> LateChannels | None:
     """Finds channels of an (n, k) recording without NaN that are late throughout."""
     rate, total = search.sample_rate_hz, samples.shape[1]
     most_s = search.shape.max_delay(search.c)
@@ -204,7 +212,7 @@ def _late_fault(
     numbers: NDArray[np.int64],
     group: NDArray[np.int32],
     c: float,
-) -> ChannelFault:
+) -> LateChannels:
     sizes = np.bincount(group)
     means = np.array([t[group == g].mean() for g in range(sizes.size)])
     # The largest group is right. Among equal groups, it is the earliest one.
@@ -226,13 +234,12 @@ def _late_fault(
     ]
     more = " ..." if len(others) > 3 else ""
     channels = tuple(int(k) for k in numbers[group != right])
-    return ChannelFault(
-        "unaligned",
-        channels,
-        f"{', '.join(said)}{more} against "
-        f"{channel_names(numbers[group == right].tolist())}; align the channels in time, "
-        "or record all of them with one device",
+    reference = channel_names(numbers[group == right].tolist())
+    text = (
+        f"{', '.join(said)}{more} against {reference}; align the channels in time, or "
+        "record all of them with one device"
     )
+    return LateChannels("unaligned", channels, text, float(np.abs(late).min()))
 
 
 def _ms(seconds: float) -> str:

@@ -33,7 +33,7 @@ _CLEAR = 0.5
 _SLACK = 4.0
 
 # Faults that make channels appear late, or leave out channels.
-_EXPLAINS_LATENESS = ("size", "near", "dead", "slipped")
+_EXPLAINS_LATENESS = ("size", "near", "dead", "slipped", "directional")
 
 
 class HeardRecording(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +38,9 @@ class Setting:
     snr_db: float = 25.0
     c: float = 343.2
     """Speed of sound, m/s; used without reflections only."""
+    pattern: float = 1.0
+    """Share of the omnidirectional part in microphones that point outward: 1 for none
+    else, 0.5 for cardioids, 0.37 for supercardioids."""
     room_m: tuple[float, float, float] = (6.0, 5.0, 2.8)
     middle_m: tuple[float, float, float] = (3.0, 2.2, 1.2)
     """Middle of the array in the room, m."""
@@ -67,12 +71,21 @@ class Setting:
             materials=pra.Material(absorption),
             max_order=min(order, 17),
         )
-        room.add_microphone_array((self.places + np.array(self.middle_m)).T)
+        directivity = None
+        if self.pattern < 1.0:
+            directivity = [self._outward(pra, place) for place in self.places]
+        places = (self.places + np.array(self.middle_m)).T
+        room.add_microphone_array(places, directivity=directivity)
         room.add_source(self.source + np.array(self.middle_m))
         room.compute_rir()
         rows = [rir[0] for rir in room.rir]
         longest = max(map(len, rows))
         return np.array([np.pad(row, (0, longest - len(row))) for row in rows])
+
+    def _outward(self, pra: Any, place: NDArray[np.float64]) -> Any:
+        azimuth = float(np.arctan2(place[1], place[0]))
+        axis = pra.directivities.DirectionVector(azimuth, 0.5 * np.pi, degrees=False)
+        return pra.directivities.CardioidFamily(axis, self.pattern)
 
     def heard(
         self, sound: NDArray[np.float64], rng: np.random.Generator
