@@ -51,11 +51,11 @@ _FLOOR_SAMPLES = 0.05
 _SLOWEST = 1.15
 
 # Distance of a near source from a small array, m.
-_NEAR_M = 0.3
+_NEAR_M = 0.5
 
-# Largest probability that a fault is a chance: that a sound channel has no delays, or
+# Largest probability that a fault is a chance: that a sound channel has no delays, and
 # that sources at two places have equal delays in all channels but some.
-_CHANCE = 1e-4
+_CHANCE, _COINCIDENCE = 1e-4, 3e-3
 
 # Largest share of the stretches in which a sound channel has delays.
 _SURE = 0.95
@@ -245,7 +245,7 @@ def _jump_at(split: int, delays: ChannelDelays, search: LagSearch) -> _Jump | No
     # A source that moves leaves the delays of the other channels by chance only.
     chance = float(np.median((error / search.allowed_s)[within])) ** (count - 2)
     wave = _wave_explains(before, after, known, float(np.median(error[across])), search)
-    if wave and chance > _CHANCE:
+    if wave and chance > _COINCIDENCE:
         return None
     # The smaller group jumps. Of equal groups, the one that becomes early lost samples.
     second = first.sum() > count / 2 or (2 * first.sum() == count and step < 0.0)

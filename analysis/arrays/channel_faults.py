@@ -45,8 +45,9 @@ _GAIN_DEVIATIONS = 5.0
 # Omnidirectional microphones with equal gains hear a distant source at equal levels.
 # Directional microphones are likely if the levels differ by more than a number of
 # standard deviations of the gain: levels of inverted or late channels from those of the
-# others, and the highest from the lowest level.
-_DIFFERS, _SPREAD = 1.5, 4.0
+# others, and the highest from the lowest level. Distances cause differences as well,
+# so the standard deviation counts as at least _LEAST_GAIN_DB.
+_DIFFERS, _SPREAD, _LEAST_GAIN_DB = 1.5, 4.0, 2.0
 
 # A microphone that points away from the source may hear an echo instead of the direct
 # sound. The strongest echo arrives within this time, s.
@@ -236,7 +237,7 @@ def _inverted(
     # The sign of a channel without any sound in common with the others is arbitrary.
     negative = np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
     louder = _louder_db(measured, negative) if negative.size else 0.0
-    if abs(louder) > _DIFFERS * gain_std_db:
+    if abs(louder) > _DIFFERS * max(gain_std_db, _LEAST_GAIN_DB):
         channels = use[negative].tolist()
         seen = f"inverted, and {_louder(louder)} than the others"
         text = f"{channel_names(channels)}: {seen}; {_OR_WIRES}"
@@ -262,7 +263,7 @@ def _late_or_echo(
 ) -> ChannelFault:
     """Adds another cause to a fault of late channels if these are also fainter."""
     louder = _louder_db(measured, np.flatnonzero(np.isin(use, late.channels)))
-    differs = abs(louder) > _DIFFERS * gain_std_db
+    differs = abs(louder) > _DIFFERS * max(gain_std_db, _LEAST_GAIN_DB)
     if not differs or late.seconds > _ECHO_S:
         return late
     seen, _, remedy = late.message.partition("; ")
@@ -276,7 +277,7 @@ def _not_of_directivity(
 ) -> list[ChannelFault]:
     """Replaces faults of the geometry if unequal levels have another explanation."""
     spread = float(np.ptp(20.0 * np.log10(np.maximum(measured.level, 1e-300))))
-    if spread < _SPREAD * gain_std_db:
+    if spread < _SPREAD * max(gain_std_db, _LEAST_GAIN_DB):
         return faults
     text = (
         f"recording: the delays fit no source, and the levels differ by {spread:.0f} "

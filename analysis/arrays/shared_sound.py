@@ -31,6 +31,10 @@ _VARIES_DB = 2.0
 # Least correlation of the levels of a channel that follows the others, and its least
 # value in standard deviations of independent levels.
 _FOLLOWS, _DEVIATIONS = 0.5, 3.0
+# Largest correlation that is required of few frames.
+_ALIKE = 0.9
+# A level that varies less than this does not vary, dB.
+_STEADY_DB = 1e-6
 
 _DEAD = (
     "dead, it has nothing in common with the sound in the others; check its "
@@ -47,16 +51,18 @@ def strangers(
 ) -> list[ChannelFault]:
     """Finds channels whose correlations with all others are those of noise.
 
-    A channel is dead if pairs of others that are as far apart share a sound, or if its
-    level does not follow the levels of the others. Otherwise its microphone may only be
+    A channel is dead if its level does not follow the levels of the others. If these do
+    not vary, it is dead if pairs of others that are as far apart share a sound.
+    Otherwise its microphone may only be
     far from the others. ``use`` lists the channels of ``measured``.
     """
     table = np.zeros((use.size, use.size))
     table[tuple(measured.pairs.T)] = measured.shared
     table += table.T
     best = table.max(axis=0)
-    if use.size < 3 or best.max() < COHERENT:
+    if use.size < 3:
         return []
+    coherent = bool(best.max() > COHERENT)
     p = shape.p_AM[use]
     apart = np.linalg.norm(p[:, np.newaxis] - p, axis=2)
     np.fill_diagonal(apart, np.inf)
@@ -66,7 +72,9 @@ def strangers(
         others = np.flatnonzero(~strange)
         as_far = np.triu(apart[np.ix_(others, others)] >= _AS_FAR * apart[k].min(), 1)
         standard = np.any(table[np.ix_(others, others)][as_far] > COHERENT)
-        follows = _follows(measured.levels, int(k), others)
+        follows = _follows(measured.levels, int(k))
+        if not coherent and follows is not False:
+            continue
         dead = not follows if follows is not None else bool(standard)
         channel, text = int(use[k]), _DEAD if dead else _APART
         kind = "dead" if dead else "apart"
@@ -74,18 +82,25 @@ def strangers(
     return faults
 
 
-def _follows(
-    levels: NDArray[np.float64], k: int, others: NDArray[np.int64]
-) -> bool | None:
-    """Returns whether the level of a channel follows the mean level of the others.
+def _follows(levels: NDArray[np.float64], k: int) -> bool | None:
+    """Returns whether the level of a channel follows the levels of the others.
 
-    It is None if these levels do not vary. The (f, n) ``levels`` are those of frames.
+    It is None if fewer than two others vary together. The (f, n) ``levels`` are those
+    of frames.
     """
     level_db = 20.0 * np.log10(np.maximum(levels, 1e-30))
-    mean_db = level_db[:, others].mean(axis=1)
-    if len(levels) < 3 or mean_db.std() < _VARIES_DB:
+    others = np.delete(level_db, k, axis=1)
+    median_db = np.median(others, axis=1)
+    if len(levels) < 3 or median_db.std() < _VARIES_DB:
         return None
-    if level_db[:, k].std() == 0.0:
-        return False
-    alike = float(np.corrcoef(level_db[:, k], mean_db)[0, 1])
-    return alike > max(_FOLLOWS, min(_DEVIATIONS / np.sqrt(len(levels)), 0.9))
+    least = max(_FOLLOWS, min(_DEVIATIONS / np.sqrt(len(levels)), _ALIKE))
+    alike = [_correlation(other, median_db) > least for other in others.T]
+    if np.count_nonzero(alike) < 2:
+        return None
+    return _correlation(level_db[:, k], median_db) > least
+
+
+def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    if min(one.std(), other.std()) < _STEADY_DB:
+        return 0.0
+    return float(np.corrcoef(one, other)[0, 1])

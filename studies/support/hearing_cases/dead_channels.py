@@ -65,7 +65,7 @@ def _clap(name: str, place: int, t60_s: float) -> tuple[NDArray[np.float64], Set
 
 
 def _sound_one(name: str, place: int, t60_s: float) -> Outcome:
-    """A recording in order is not refused, and its bearing is right or not stated."""
+    """A recording in order is not refused, and its bearing is right, or flagged."""
     samples, setting = _clap(name, place, t60_s)
     geometry = ArrayGeometry(
         microphones=tuple(map(tuple, setting.places.tolist())), temperature_c=20.0
@@ -86,7 +86,8 @@ def _sound_one(name: str, place: int, t60_s: float) -> Outcome:
     bearing, std = main["bearing_deg"], main["bearing_std_deg"] or 0.0
     kinds = [fault.kind for fault in result.faults]
     said = f"{bearing} +- {std:.1f} for {truth:.1f}, {kinds}"
-    near = bearing is None or float(off_by_deg(bearing, truth)) < max(3.0 * std, 5.0)
+    flagged = bearing is None or "apart" in kinds
+    near = flagged or float(off_by_deg(bearing, truth)) < max(3.0 * std, 5.0)
     claims = any(
         heard.confidence > CLAIM and off_by_deg(heard.bearing_deg, truth) > 15.0
         for heard in result.heard.sources
