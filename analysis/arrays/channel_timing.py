@@ -127,9 +127,7 @@ class LagSearch:
         pairs, length = self.pairs, blocks[0].shape[1]
         i, j = pairs.T
         size = int(fft.next_fast_len(2 * length, real=True))
-        low, high = (
-            math.ceil(f * size / self.sample_rate_hz) for f in self.band_hz
-        )
+        low, high = (math.ceil(f * size / self.sample_rate_hz) for f in self.band_hz)
         band = slice(low, min(high, size // 2) + 1)
         cross = np.zeros((len(pairs), band.stop - band.start), np.complex64)
         window = np.hanning(length) if len(blocks) == 1 else np.ones(length)

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.frame_delays import (
     DelayScale,

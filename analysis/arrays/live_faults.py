@@ -149,9 +149,7 @@ class LiveFaults:
             self._known,
             sample_rate_hz=float(self.sample_rate_hz),
             band_hz=self.geometry.band,
-            omitted=[
-                k for k in range(self._known.shape.count) if k not in self._alive
-            ],
+            omitted=[k for k in range(self._known.shape.count) if k not in self._alive],
         )
 
     def _is_done(self, pending: Future[list[ChannelFault]]) -> bool:

@@ -95,7 +95,9 @@ def test_a_source_that_changes_its_place_loses_no_samples():
 
 
 @pytest.mark.parametrize("first", [True, False])
-@pytest.mark.parametrize(("level", "seen"), [(0.05, "without the sound"), (0, "silent")])
+@pytest.mark.parametrize(
+    ("level", "seen"), [(0.05, "without the sound"), (0, "silent")]
+)
 def test_a_channel_that_is_dead_for_half_of_the_time(first, level, seen):
     samples = HEARD.copy()
     rng = np.random.default_rng(1)
