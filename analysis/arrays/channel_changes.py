@@ -112,14 +112,14 @@ def dying_channel(
     delays: ChannelDelays, search: LagSearch, *, backward: bool = False
 ) -> ChannelFault | None:
     """Finds a channel that has delays only before, or ``backward`` after, some time."""
-    heard = np.isfinite(delays.lags)
+    heard: NDArray[np.bool_] = np.isfinite(delays.lags)
     pairs = search.pairs
     for k in range(search.shape.count):
         own = np.any(pairs == k, axis=1)
         if not np.any(~own):
             continue
-        others = np.flatnonzero(heard[:, ~own].any(axis=1))
-        has = heard[others][:, own].any(axis=1)
+        others = np.flatnonzero(np.any(heard[:, ~own], axis=1))
+        has = np.any(heard[others][:, own], axis=1)
         if backward:
             others, has = others[::-1], has[::-1]
         if not has.any():
@@ -152,8 +152,8 @@ def slipping_channels(delays: ChannelDelays, search: LagSearch) -> ChannelFault 
     if not jumps:
         return None
     jump = max(jumps, key=lambda jump: jump.significance)
-    first, last = _holds(jump, delays)
-    if last is None:
+    time_s = _time_of(jump, delays)
+    if time_s is None:
         return None
     rate = search.sample_rate_hz
     step, channels = jump.step_s, [search.numbers[k] for k in jump.channels]
@@ -163,17 +163,15 @@ def slipping_channels(delays: ChannelDelays, search: LagSearch) -> ChannelFault 
         "slipped",
         tuple(channels),
         f"{channel_names(channels)}: {samples} sample{'s' * (samples > 1)} "
-        f"({1e3 * abs(step):.3g} ms) {what} at {0.5 * (first + last):.1f} s; check "
+        f"({1e3 * abs(step):.3g} ms) {what} at {time_s:.1f} s; check "
         "the recorder, or use only the part before or after",
     )
 
 
-def _holds(
-    jump: _Jump, delays: ChannelDelays
-) -> tuple[float, float] | tuple[None, None]:
-    """Returns the times of the last stretch before a jump, and of the first one after.
+def _time_of(jump: _Jump, delays: ChannelDelays) -> float | None:
+    """Returns the time of a jump, s.
 
-    They are None if the delays of the recording do not keep the values on either side.
+    It is None if the delays of the recording do not keep the values on either side.
     """
     lags = delays.lags[:, jump.across]
     heard = np.isfinite(lags).any(axis=1)
@@ -183,9 +181,9 @@ def _holds(
     near = 0.25 * abs(jump.step_s)
     is_after = np.nanmedian((lags - middle) * side, axis=1) > 0.0
     # The best split has the most stretches on the right sides.
-    wrong = np.cumsum(is_after) - np.cumsum(~is_after)
+    wrong = np.cumsum(np.where(is_after, 1, -1))
     if len(lags) < 2 * _LEAST:
-        return None, None
+        return None
     k = int(np.argmin(wrong[:-1]))
     off = np.where(
         np.arange(len(lags))[:, np.newaxis] > k,
@@ -194,8 +192,8 @@ def _holds(
     )
     kept = np.nanmedian(np.abs(off), axis=1) < near
     if min(kept[: k + 1].mean(), kept[k + 1 :].mean()) < _KEPT:
-        return None, None
-    return float(times[k]), float(times[k + 1])
+        return None
+    return 0.5 * float(times[k] + times[k + 1])
 
 
 class _Jump(NamedTuple):

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-_Kind = Literal[
+#: What is wrong.
+FaultKind = Literal[
     "nan", "dead", "apart", "copied", "clipped", "inverted", "directional", "swapped",
     "near", "geometry", "units", "speed", "size", "late", "unaligned", "slipped",
     "drift"
@@ -17,7 +18,7 @@ _Kind = Literal[
 class ChannelFault:
     """A fault of one or more channels, or of the description of the array."""
 
-    kind: _Kind
+    kind: FaultKind
     channels: tuple[int, ...]
     """Numbers of the faulty channels, from 0. Empty if the fault concerns all channels.
     """

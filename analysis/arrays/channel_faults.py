@@ -24,8 +24,8 @@ from analysis.arrays.array_geometry import (
     KnownArray,
     usable_band,
 )
-from analysis.arrays.channel_fault import ChannelFault, channel_names
-from analysis.arrays.channel_timing import LagSearch, unaligned_channels
+from analysis.arrays.channel_fault import ChannelFault, FaultKind, channel_names
+from analysis.arrays.channel_timing import LagSearch, LateChannels, unaligned_channels
 from analysis.arrays.frame_delays import REACHES_M, FrameDelays
 from analysis.arrays.geometry_faults import geometry_faults
 from analysis.arrays.pair_correlations import PairCorrelations, correlate_pairs
@@ -81,8 +81,8 @@ def find_channel_faults(
     """Finds the faults of the (n, samples) channels of a recording.
 
     An empty list does not prove that all channels are good, because a silent recording
-    shows few faults. The channels ``omitted`` are not examined. If ``band_hz`` is None, the band is 300 Hz up to 8000 Hz or 0.45
-    times the sample rate, whichever is lower.
+    shows few faults. The channels ``omitted`` are not examined. If ``band_hz`` is None,
+    the band is 300 Hz up to 8000 Hz or 0.45 times the sample rate, whichever is lower.
     """
     shape, c = array.shape, array.c
     examined = [k for k in range(len(samples)) if k not in omitted]
@@ -136,7 +136,7 @@ def find_channel_faults(
     return found + _not_of_directivity(of_geometry, measured, array.gain_std_db)
 
 
-def _of_channel(kind: _Kind, k: int, text: str) -> ChannelFault:
+def _of_channel(kind: FaultKind, k: int, text: str) -> ChannelFault:
     return ChannelFault(kind, (k,), f"channel {k + 1}: {text}")
 
 
@@ -256,7 +256,7 @@ def _louder(by_db: float) -> str:
 
 
 def _late_or_echo(
-    late: ChannelFault,
+    late: LateChannels,
     measured: PairCorrelations,
     use: NDArray[np.int64],
     gain_std_db: float,

@@ -259,7 +259,7 @@ def _arrivals(
 
 
 def _is_wave(t: NDArray[np.float64], p: NDArray[np.float64]) -> bool:
-    """Returns whether a plane wave of any speed explains (n,) times at (n, d) positions.
+    """Returns whether a plane wave of any speed explains (n,) times at (n, d) places.
 
     It does not if it would explain any times.
     """

@@ -297,7 +297,7 @@ def _follows_range(
     expected = _expected_db(fix, shape)
     expected -= expected.mean()
     measured = 20.0 * np.log10(np.maximum(levels, 1e-300))
-    return float(measured @ expected / max(expected @ expected, 1e-30))
+    return float(measured @ expected) / max(float(expected @ expected), 1e-30)
 
 
 class DelayScale(NamedTuple):

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.channel_fault import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault, FaultKind
 from analysis.arrays.pair_correlations import PairCorrelations
 from systems.sound.array_shape import ArrayShape
 
@@ -77,7 +77,7 @@ def strangers(
             continue
         dead = not follows if follows is not None else bool(standard)
         channel, text = int(use[k]), _DEAD if dead else _APART
-        kind = "dead" if dead else "apart"
+        kind: FaultKind = "dead" if dead else "apart"
         faults.append(ChannelFault(kind, (channel,), f"channel {channel + 1}: {text}"))
     return faults
 

@@ -7,6 +7,7 @@ two 2 cm apart (jpers1/sound-source-localization). Claps in a room.
 from __future__ import annotations
 
 import logging
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +75,7 @@ def _sound_one(name: str, place: int, t60_s: float) -> Outcome:
     try:
         result = locate(samples, geometry, sample_rate_hz=_RATE)
     except ValueError as error:
-        return Outcome(False, str(error))
+        return Outcome(right=False, said=str(error))
     finally:
         logging.disable(logging.NOTSET)
     # Bearings are from the centroid. In a row, they are those of cones.
@@ -109,7 +110,7 @@ def _dead_one(name: str, place: int, t60_s: float, channel: int) -> Outcome:
     except ValueError as error:
         right = f"channel {channel + 1}: dead" in str(error)
         return Outcome(right, str(error))
-    return Outcome(False, "not refused")
+    return Outcome(right=False, said="not refused")
 
 
 def cases() -> list[HearingCase]:
@@ -117,17 +118,17 @@ def cases() -> list[HearingCase]:
     found = []
     for name in _ARRAYS:
         for place in range(len(_PLACES)):
-            for t60_s in (0.3, 0.4, 0.6):
-                found.append(
-                    HearingCase(
-                        f"{name}, place {place}, T60 {t60_s} s",
-                        lambda n=name, p=place, t=t60_s: _sound_one(n, p, t),
-                    )
+            found += [
+                HearingCase(
+                    f"{name}, place {place}, T60 {t60_s} s",
+                    partial(_sound_one, name, place, t60_s),
                 )
+                for t60_s in (0.3, 0.4, 0.6)
+            ]
             found.append(
                 HearingCase(
                     f"{name}, place {place}, channel 3 of noise",
-                    lambda n=name, p=place: _dead_one(n, p, 0.3, 2),
+                    partial(_dead_one, name, place, 0.3, 2),
                 )
             )
     return found

@@ -1,10 +1,10 @@
-"""Late recorders, lost samples, dying channels, water, near sources, and directivity."""
+"""Late recorders, lost samples, dying channels, water, near and directional cases."""
 
 from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
@@ -145,13 +145,16 @@ def _names(out: tuple[int, ...]) -> str:
     return f"channel{'s' * (len(out) > 1)} {' and '.join(str(k + 1) for k in out)}"
 
 
+_Judged = tuple[str, Callable[[], Outcome]]
+
+
 def cases() -> list[HearingCase]:
     """Returns the cases of this kind."""
-    found = []
+    each = (*_late_ones(), *_changing_ones(), *_other_ones(), *_live_ones())
+    return [HearingCase(name, judge) for name, judge in each]
 
-    def add(name: str, judge: Callable[[], Outcome]) -> None:
-        found.append(HearingCase(name, judge))
 
+def _late_ones() -> Iterator[_Judged]:
     pairs = {"square": (2, 3), "row": (2, 3), "circle": (4, 5), "1.5 m": (1,)}
     for array, out in pairs.items():
         for ms in (1.5, 10.0, 50.0, 200.0):
@@ -159,41 +162,49 @@ def cases() -> list[HearingCase]:
                 continue  # shorter than the delays of this array
             words = (_names(out), "late")
             make = partial(_late, array, out, ms)
-            add(f"{array}, {ms} ms late", partial(_located, make, words))
+            yield f"{array}, {ms} ms late", partial(_located, make, words)
+
+
+def _changing_ones() -> Iterator[_Judged]:
     for array in _ARRAYS:
         for out, count in (((1,), 1), ((1,), 37), ((3,), 480)):
             make = partial(_lost, array, out, count)
             words = (_names(out), f"{count} sample", "lost at 6")
-            add(f"{array}, {count} lost", partial(_located, make, words))
+            yield f"{array}, {count} lost", partial(_located, make, words)
         for instead in ("noise", "zeros"):
             make = partial(_dying, array, 2, instead)
             words = ("channel 3: dead", "from 6")
-            add(f"{array}, {instead} from half way", partial(_located, make, words))
+            yield f"{array}, {instead} from half way", partial(_located, make, words)
+
+
+def _other_ones() -> Iterator[_Judged]:
     for edge_m in (0.3, 1.0):
         for bearing in (20.0, 130.0, 250.0):
             make = partial(_in_water, edge_m, bearing)
             judge = partial(_located, make, ("speed of sound",), temperature_c=None)
-            add(f"tetrahedron of {edge_m} m in water, {bearing:g} deg", judge)
+            yield f"tetrahedron of {edge_m} m in water, {bearing:g} deg", judge
     for array, bearing in (("square", 35.0), ("circle", 80.0), ("row", 60.0)):
         for range_m in (0.1, 0.15):
             make = partial(_near, array, range_m, bearing)
             words = ("the source is about", "0.2 m away")
-            add(f"{array}, source at {range_m} m", partial(_located, make, words))
+            yield f"{array}, source at {range_m} m", partial(_located, make, words)
     for pattern in (0.5, 0.37):
         for bearing in (45.0, 10.0):
             make = partial(_directional, 5.0 * CIRCLE, pattern, bearing)
             judge = partial(_located, make, ("directional",))
-            add(f"circle of 0.5 m, pattern {pattern}, {bearing:g} deg", judge)
+            yield f"circle of 0.5 m, pattern {pattern}, {bearing:g} deg", judge
+
+
+def _live_ones() -> Iterator[_Judged]:
     for array in ("square", "row", "circle"):
         for count in (1, 37):
             make = partial(_lost, array, (1,), count)
             words = ("channel 2", "lost at 6", "left out")
-            add(f"listen: {array}, {count} lost", partial(_listened, make, words))
+            yield f"listen: {array}, {count} lost", partial(_listened, make, words)
         make = partial(_dying, array, 2, "noise")
         words = ("channel 3", "left out")
-        add(f"listen: {array}, noise from half way", partial(_listened, make, words))
+        yield f"listen: {array}, noise from half way", partial(_listened, make, words)
     for array, out in (("square", (1,)), ("row", (3,)), ("circle", (4, 5))):
         make = partial(_late, array, out, 20.0)
         words = (_names(out), "late", "left out")
-        add(f"listen: {array}, {_names(out)} late", partial(_listened, make, words))
-    return found
+        yield f"listen: {array}, {_names(out)} late", partial(_listened, make, words)
