@@ -88,7 +88,8 @@ def _listened(
     named = [fault for fault in heard.faults if all(word in fault for word in words)]
     last = [bearing for t_s, bearing in told if t_s > heard.seconds - 2.0]
     off = off_by_deg(float(np.median(last)), setting.bearing_deg) if last else 180.0
-    right = len(named) == len(heard.faults) == 1 and not heard.failed and off < 10.0
+    one = len(named) == len(heard.faults) == 1
+    right = one and not heard.failed and bool(off < 10.0)
     return Outcome(right, f"{heard.status}, {off:.0f} deg off: {heard.faults}")
 
 
@@ -160,8 +161,8 @@ def _late_ones() -> Iterator[_Judged]:
         for ms in (1.5, 10.0, 50.0, 200.0):
             if array == "1.5 m" and ms < 10.0:
                 continue  # shorter than the delays of this array
-            words = (_names(out), "late")
             make = partial(_late, array, out, ms)
+            words: tuple[str, ...] = (_names(out), "late")
             yield f"{array}, {ms} ms late", partial(_located, make, words)
 
 
@@ -169,7 +170,7 @@ def _changing_ones() -> Iterator[_Judged]:
     for array in _ARRAYS:
         for out, count in (((1,), 1), ((1,), 37), ((3,), 480)):
             make = partial(_lost, array, out, count)
-            words = (_names(out), f"{count} sample", "lost at 6")
+            words: tuple[str, ...] = (_names(out), f"{count} sample", "lost at 6")
             yield f"{array}, {count} lost", partial(_located, make, words)
         for instead in ("noise", "zeros"):
             make = partial(_dying, array, 2, instead)
@@ -186,7 +187,7 @@ def _other_ones() -> Iterator[_Judged]:
     for array, bearing in (("square", 35.0), ("circle", 80.0), ("row", 60.0)):
         for range_m in (0.1, 0.15):
             make = partial(_near, array, range_m, bearing)
-            words = ("the source is about", "0.2 m away")
+            words: tuple[str, ...] = ("the source is about", "0.2 m away")
             yield f"{array}, source at {range_m} m", partial(_located, make, words)
     for pattern in (0.5, 0.37):
         for bearing in (45.0, 10.0):
@@ -199,7 +200,7 @@ def _live_ones() -> Iterator[_Judged]:
     for array in ("square", "row", "circle"):
         for count in (1, 37):
             make = partial(_lost, array, (1,), count)
-            words = ("channel 2", "lost at 6", "left out")
+            words: tuple[str, ...] = ("channel 2", "lost at 6", "left out")
             yield f"listen: {array}, {count} lost", partial(_listened, make, words)
         make = partial(_dying, array, 2, "noise")
         words = ("channel 3", "left out")
