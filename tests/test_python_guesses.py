@@ -21,7 +21,9 @@ def test_fields_are_keywords():
         phonotaxis.load_scenario("default", {"law": "conventional"}, duration_s=3.0),
         phonotaxis.load_scenario("default", ["law=conventional", "duration_s=3.0"]),
         phonotaxis.load_scenario("default").with_(law="conventional", duration_s=3.0),
-        phonotaxis.load_scenario("default").with_({"law": "conventional"}, duration_s=3),
+        phonotaxis.load_scenario("default").with_(
+            {"law": "conventional"}, duration_s=3
+        ),
     ]
     assert all(way == ways[0] for way in ways)
     assert ways[0] != phonotaxis.load_scenario("default", duration_s=3.0)

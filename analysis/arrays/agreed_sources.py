@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.heard_sources import FollowedSource, HeardSource, HeardSources
 from analysis.arrays.place_medians import median, median_angle
 from analysis.arrays.source_estimate import SourceEstimate

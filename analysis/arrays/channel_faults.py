@@ -5,16 +5,16 @@ There are these checks:
 - Each channel alone: whether it has NaN values, is constant, or is clipped.
 - Pairs of channels: whether one is a copy of the other
   (``analysis.arrays.copied_microphones``).
-- Each channel compared with the others: its level, and the height and the sign of its
-  correlation with them.
+- Each channel compared with the others: its level, its alignment in time
+  (``analysis.arrays.channel_timing``), the height of its correlation with them
+  (``analysis.arrays.shared_sound``), and the sign of this correlation.
 - The delays of all channels: whether they match the size of the array, and whether
-  they fit a position of a source (``analysis.arrays.frame_delays``).
+  they fit a position of a source (``analysis.arrays.geometry_faults``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,17 +24,13 @@ from analysis.arrays.array_geometry import (
     KnownArray,
     usable_band,
 )
+from analysis.arrays.channel_fault import ChannelFault, FaultKind, channel_names
+from analysis.arrays.channel_timing import LagSearch, LateChannels, unaligned_channels
 from analysis.arrays.copied_microphones import copied_microphones
-from analysis.arrays.frame_delays import (
-    REACHES_M,
-    DelayScale,
-    FrameDelays,
-    delay_scale,
-    exchanged_channels,
-    misfit,
-)
+from analysis.arrays.frame_delays import REACHES_M, FrameDelays
+from analysis.arrays.geometry_faults import geometry_faults
 from analysis.arrays.pair_correlations import PairCorrelations, correlate_pairs
-from systems.sound.array_shape import ArrayShape
+from analysis.arrays.shared_sound import COHERENT, strangers
 
 # _DEAD_DB: a channel is dead if it is more than this below the second loudest of the
 #   others, dB.
@@ -46,6 +42,21 @@ _DEAD_DB = 30.0
 _NEAR_DB = 15.0
 _GAIN_DEVIATIONS = 5.0
 
+# Omnidirectional microphones with equal gains hear a distant source at equal levels.
+# Directional microphones are likely if the levels differ by more than a number of
+# standard deviations of the gain: levels of inverted or late channels from those of the
+# others, and the highest from the lowest level. Distances cause differences as well,
+# so the standard deviation counts as at least _LEAST_GAIN_DB.
+_DIFFERS, _SPREAD, _LEAST_GAIN_DB = 1.5, 4.0, 2.0
+
+# A microphone that points away from the source may hear an echo instead of the direct
+# sound. The strongest echo arrives within this time, s.
+_ECHO_S = 0.03
+
+_OR_WIRES = (
+    "directional microphones? Use omnidirectional ones, or exchange the wires of these"
+)
+
 # _LEAST_PILE: least number of samples of a clipped channel at an extreme value.
 # _CLIPPED_SHARE: least share of the samples of a clipped channel at an extreme value.
 # _PILE: how many times more often the extreme value occurs than each of the next three
@@ -54,42 +65,9 @@ _LEAST_PILE = 5
 _CLIPPED_SHARE = 1e-4
 _PILE = 4.0
 
-# Limits of a correlation, as multiples of the correlation of noise. Above _COHERENT,
-# two channels share a sound. Below _INCOHERENT, they share nothing.
-_COHERENT, _INCOHERENT = 5.0, 2.5
-
-# Least number of frames that must agree. Fewer frames may agree by chance, for example
-# in a recording with few long frames.
-_LEAST_FRAMES = 16
-
-# Delays that are too long by more than this factor mean wrong units of the positions.
-# Up to this factor, they mean wrong positions or wrongly ordered channels.
-_OTHER_UNITS = 3.5
-
-# Largest plausible distance of a source straight above the array, m.
-_FARTHEST_M = 20.0
-
 # Least difference between the positive and the negative peak of a correlation, as a
 # share of the sum of both.
 _LEAD = 0.1
-
-
-_Kind = Literal[
-    "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
-    "units", "size", "late", "drift", "moves", "tone", "reflector"
-]  # fmt: skip
-
-
-@dataclass(frozen=True)
-class ChannelFault:
-    """A fault of one or more channels, or of the description of the array."""
-
-    kind: _Kind
-    channels: tuple[int, ...]
-    """Numbers of the faulty channels, from 0. Empty if the fault concerns all channels.
-    """
-    message: str
-    """One line with the observation and the remedy. It counts channels from 1."""
 
 
 def find_channel_faults(
@@ -98,17 +76,19 @@ def find_channel_faults(
     *,
     sample_rate_hz: float,
     band_hz: tuple[float, float] | None = None,
+    omitted: Sequence[int] = (),
 ) -> list[ChannelFault]:
     """Finds the faults of the (n, samples) channels of a recording.
 
     An empty list does not prove that all channels are good, because a silent recording
-    shows few faults. If ``band_hz`` is None, the band is 300 Hz up to 8000 Hz or 0.45
-    times the sample rate, whichever is lower.
+    shows few faults. The channels ``omitted`` are not examined. If ``band_hz`` is None,
+    the band is 300 Hz up to 8000 Hz or 0.45 times the sample rate, whichever is lower.
     """
     shape, c = array.shape, array.c
-    faults = [_unreadable(k, channel) for k, channel in enumerate(samples)]
-    found = [fault for fault in faults if fault is not None]
-    use = np.array([k for k, fault in enumerate(faults) if fault is None], dtype=int)
+    examined = [k for k in range(len(samples)) if k not in omitted]
+    found = [f for k in examined if (f := _unreadable(k, samples[k])) is not None]
+    unread = {k for fault in found for k in fault.channels}
+    use = np.array([k for k in examined if k not in unread], dtype=int)
     found += [fault for k in use if (fault := _clipped(int(k), samples[k])) is not None]
     if use.size < 2:
         return found
@@ -121,12 +101,19 @@ def find_channel_faults(
     measured = correlate_pairs(readable, shape.max_delay(c), sample_rate_hz, band_hz)
     if measured is None:
         return found
-    beside = _levels(measured, use, array.gain_std_db) + _strangers(measured, use)
-    dead = {k for fault in beside if fault.kind == "dead" for k in fault.channels}
-    found += beside
-    inverted = _inverted(measured, use, dead)
+    found += _levels(measured, use, array.gain_std_db)
+    dead = {k for fault in found if fault.kind == "dead" for k in fault.channels}
+    heard = np.array([k for k in range(use.size) if int(use[k]) not in dead])
+    if heard.size > 2:
+        search = LagSearch.of(array, sample_rate_hz, band_hz, use[heard].tolist())
+        late = unaligned_channels(readable[heard], search)
+        if late is not None:
+            return [*found, _late_or_echo(late, measured, use, array.gain_std_db)]
+    found += strangers(measured, use, shape)
+    dead = {k for fault in found if fault.kind == "dead" for k in fault.channels}
+    inverted = _inverted(measured, use, dead, array.gain_std_db)
     found += inverted
-    if use.size < shape.count or dead or any(f.kind == "near" for f in beside):
+    if use.size < shape.count or dead or any(f.kind == "near" for f in found):
         return found
     signs = np.ones(shape.count)
     signs[[k for fault in inverted for k in fault.channels]] = -1.0
@@ -141,20 +128,18 @@ def find_channel_faults(
             gain_std_db=array.gain_std_db,
         )
 
-    as_given = delays(measured)
-    order = _order(as_given)
-    if any(fault.kind == "swapped" for fault in order):
-        return found + order
-    scale = delay_scale(as_given)
-    if not _fits(as_given):
-        for reach_m in REACHES_M:
-            seen = correlate_pairs(readable, reach_m / c, sample_rate_hz, band_hz)
-            if seen is not None and scale is None:
-                scale = delay_scale(delays(seen))
-    return found + (order if scale is None else [_scale_fault(scale, shape)])
+    def farther() -> list[FrameDelays]:
+        seen = [
+            correlate_pairs(readable, reach_m / c, sample_rate_hz, band_hz)
+            for reach_m in REACHES_M
+        ]
+        return [delays(each) for each in seen if each is not None]
+
+    of_geometry = geometry_faults(delays(measured), c, farther)
+    return found + _not_of_directivity(of_geometry, measured, array.gain_std_db)
 
 
-def _of_channel(kind: _Kind, k: int, text: str) -> ChannelFault:
+def _of_channel(kind: FaultKind, k: int, text: str) -> ChannelFault:
     return ChannelFault(kind, (k,), f"channel {k + 1}: {text}")
 
 
@@ -232,28 +217,15 @@ def _levels(
     return faults
 
 
-def _strangers(
-    measured: PairCorrelations, use: NDArray[np.int64]
-) -> list[ChannelFault]:
-    """Finds channels that have no sound in common with the others."""
-    table = np.zeros((use.size, use.size))
-    table[tuple(measured.pairs.T)] = measured.shared
-    best = (table + table.T).max(axis=0)
-    if use.size < 3 or best.max() < _COHERENT:
-        return []
-    return [
-        _dead(channel, "it has nothing in common with the sound in the others")
-        for k, channel in enumerate(use.tolist())
-        if best[k] < _INCOHERENT
-    ]
-
-
 def _inverted(
-    measured: PairCorrelations, use: NDArray[np.int64], dead: set[int]
+    measured: PairCorrelations,
+    use: NDArray[np.int64],
+    dead: set[int],
+    gain_std_db: float,
 ) -> list[ChannelFault]:
     """Finds channels that have negative correlations with most other channels."""
     high, low = measured.pooled_highest, -measured.pooled_lowest
-    heard = np.maximum(high, low) > _COHERENT * measured.noise
+    heard = np.maximum(high, low) > COHERENT * measured.noise
     table = np.zeros((use.size, use.size))
     table[tuple(measured.pairs.T)] = np.where(heard, (high - low) / (high + low), 0.0)
     table += table.T
@@ -272,7 +244,59 @@ def _inverted(
     )
     # The sign of a channel without any sound in common with the others is arbitrary.
     negative = np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
+    louder = _louder_db(measured, negative) if negative.size else 0.0
+    if abs(louder) > _DIFFERS * max(gain_std_db, _LEAST_GAIN_DB):
+        channels = use[negative].tolist()
+        seen = f"inverted, and {_louder(louder)} than the others"
+        text = f"{channel_names(channels)}: {seen}; {_OR_WIRES}"
+        return [ChannelFault("directional", tuple(channels), text)]
     return [_of_channel("inverted", int(use[k]), text) for k in negative]
+
+
+def _louder_db(measured: PairCorrelations, chosen: NDArray[np.int64]) -> float:
+    """Returns the mean level of the chosen channels relative to the others, dB."""
+    level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
+    return float(level[chosen].mean() - np.delete(level, chosen).mean())
+
+
+def _louder(by_db: float) -> str:
+    return f"{abs(by_db):.0f} dB {'louder' if by_db > 0.0 else 'fainter'}"
+
+
+def _late_or_echo(
+    late: LateChannels,
+    measured: PairCorrelations,
+    use: NDArray[np.int64],
+    gain_std_db: float,
+) -> ChannelFault:
+    """Adds another cause to a fault of late channels if these are also fainter."""
+    louder = _louder_db(measured, np.flatnonzero(np.isin(use, late.channels)))
+    differs = abs(louder) > _DIFFERS * max(gain_std_db, _LEAST_GAIN_DB)
+    if not differs or late.seconds > _ECHO_S:
+        return late
+    seen, _, remedy = late.message.partition("; ")
+    cause = "directional microphones that hear an echo? If not,"
+    text = f"{seen}, and {_louder(louder)}; {cause} {remedy}"
+    return ChannelFault("directional", (), text)
+
+
+def _not_of_directivity(
+    faults: list[ChannelFault], measured: PairCorrelations, gain_std_db: float
+) -> list[ChannelFault]:
+    """Replaces faults of the geometry if unequal levels have another explanation."""
+    spread = float(np.ptp(20.0 * np.log10(np.maximum(measured.level, 1e-300))))
+    if spread < _SPREAD * max(gain_std_db, _LEAST_GAIN_DB):
+        return faults
+    text = (
+        f"recording: the delays fit no source, and the levels differ by {spread:.0f} "
+        "dB; directional microphones? Use omnidirectional ones, or check the positions"
+    )
+    return [
+        ChannelFault("directional", (), text)
+        if fault.kind in ("units", "geometry")
+        else fault
+        for fault in faults
+    ]
 
 
 def _lags(
@@ -282,48 +306,3 @@ def _lags(
     i, j = measured.pairs.T
     upright = signs[i] * signs[j] > 0.0
     return np.where(upright, measured.lag_of_highest, measured.lag_of_lowest)
-
-
-def _fits(delays: FrameDelays) -> bool:
-    agreed, _ = delays.agreeing()
-    return len(agreed) >= max(_LEAST_FRAMES, len(delays.lags) / 2)
-
-
-def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
-    size = f"an array of {shape.aperture_m:.3g} m"
-    if scale.kind == "beyond":
-        remedy = "check the positions (in m) and the order of the channels"
-        if scale.share > _OTHER_UNITS:
-            remedy = "give positions in m (multiply them by 10, 100 or 1000?)"
-        times = f"{scale.share:.1f} times as long as sound takes along it"
-        text = f"microphones: {size} cannot have delays {times}; {remedy}"
-        return ChannelFault("units", (), text)
-    said = f"delays are below {100 * scale.share:.1g} % of what {size} can have"
-    if shape.kind == "space" or scale.least_range_m > _FARTHEST_M:
-        remedy = "give positions in m (divide those in cm by 100, in mm by 1000)"
-        return ChannelFault("units", (), f"microphones: {said}; {remedy}")
-    where = "ahead of" if shape.kind == "row" else "above or below"
-    cause = f"the source is straight {where} it, or the positions are not in m"
-    text = f"microphones: {said}: {cause}; check the positions"
-    return ChannelFault("size", (), text)
-
-
-def _order(delays: FrameDelays) -> list[ChannelFault]:
-    """Finds exchanged channels, or a geometry that the delays do not fit."""
-    exchanges = exchanged_channels(delays)
-    if exchanges:
-        names = " or ".join(f"{a + 1} and {b + 1}" for a, b in exchanges)
-        text = (
-            f"channels {names}: exchanged, because the delays fit the geometry only in "
-            "the other order; exchange them in 'channels'"
-        )
-        channels = tuple(sorted({k for pair in exchanges for k in pair}))
-        return [ChannelFault("swapped", channels, text)]
-    share = misfit(delays)
-    if share is None:
-        return []
-    text = (
-        f"channels: {100 * share:.0f} % of the delays fit no place outside the array; "
-        "check the microphones' positions (in m), their order and the speed of sound"
-    )
-    return [ChannelFault("geometry", (), text)]

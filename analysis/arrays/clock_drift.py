@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.stats import theilslopes
 
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.wave_fronts import wave_front_misfits
 from systems.delays.correlations import correlations_at_lags
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from systems.hearing.coherent import arrival_delays
 from systems.hearing.multilateration import locate_source
-from systems.hearing.source_fix import SourceFix
+from systems.hearing.source_fix import NEAREST_M, SourceFix
 from systems.sound.array_shape import ArrayShape
 
 # Delays fit if their error is below the largest of three tolerances:
@@ -74,8 +74,12 @@ _MOST = 0.75
 # too short to compare.
 _LONG = 0.3
 
-# Possible error of a delay, samples.
-_SAMPLES = 1.0
+# Possible error of a delay, samples, and its usual standard deviation.
+_SAMPLES, _NEAR_SAMPLES = 1.0, 0.1
+
+# Largest ratio of the stated speed of sound to another speed, and largest scatter of
+# this ratio. Echoes in phase at near microphones may shorten delays by a third.
+_FASTER, _SCATTER = 0.5, 0.3
 
 
 @dataclass(frozen=True)
@@ -173,6 +177,58 @@ def misfit(delays: FrameDelays) -> float | None:
     return 1.0 - share if share < _HOPELESS else None
 
 
+def slower_than_stated(delays: FrameDelays) -> float | None:
+    """Returns the ratio of the stated speed of sound to the speed that delays fit.
+
+    Only microphones in space measure the speed. The result is None unless the speed is
+    at least twice the stated one: a near source causes short delays as well, but its
+    levels differ. It is also None if too few frames agree.
+    """
+    shape = delays.shape
+    d, levels = delays.agreeing()
+    if shape.kind != "space" or len(d) < 2 * _LEAST_FRAMES:
+        return None
+    later = np.hstack((np.zeros((len(d), 1)), d))
+    later -= later.mean(axis=1, keepdims=True)
+    ratios = np.linalg.norm(later @ np.linalg.pinv(shape.p_AM).T, axis=1)
+    low, middle, high = np.quantile(ratios, (0.25, 0.5, 0.75))
+    if not _NOTHING < middle < _FASTER or high - low > _SCATTER * middle:
+        return None
+    covariance = (_NEAR_SAMPLES * delays.meters_per_sample) ** 2 * (
+        np.eye(shape.count - 1) + 1.0
+    )
+    near = 0
+    for each, level in zip(d, levels, strict=True):
+        fix = locate_source(each, covariance, shape, 1.0)
+        off = arrival_delays(fix, shape, 1.0) - each
+        fits = fix.range_valid and np.abs(off).max() < delays.tolerance_m
+        near += bool(fits and _follows_range(level, fix, shape) > 0.5)
+    return None if 2 * near > len(d) else float(middle)
+
+
+def near_range_m(delays: FrameDelays) -> float | None:
+    """Returns the distance of a source that is too near to the middle of the array, m.
+
+    The result is None if most of the frames do not fit such a position, or if the
+    levels of the channels do not differ as they would for it.
+    """
+    shape = delays.shape
+    d, levels = delays.agreeing()
+    if len(d) < 2 * _LEAST_FRAMES:
+        return None
+    sigma = _NEAR_SAMPLES * delays.meters_per_sample
+    covariance = sigma**2 * (np.eye(shape.count - 1) + 1.0)
+    ranges = []
+    for each, level in zip(d, levels, strict=True):
+        fix = locate_source(each, covariance, shape, 1.0)
+        near = fix.range_valid and fix.range < NEAREST_M
+        if near and not levels_contradict(level, fix, shape, delays.gain_std_db):
+            ranges.append(fix.range)
+    if 2 * len(ranges) < len(d):
+        return None
+    return float(np.median(ranges))
+
+
 def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
     """Returns a copy of an array with the rows i and j exchanged."""
     order = np.arange(len(rows))
@@ -223,13 +279,25 @@ def levels_contradict(
     """
     if not fix.range_valid:
         return False
-    ranges = np.linalg.norm(shape.p_AM - fix.p_AS, axis=1)
-    expected = -20.0 * np.log10(np.maximum(ranges, 1e-3))
+    expected = _expected_db(fix, shape)
     if np.ptp(expected) < max(_LEAST_SPREAD_DB, _LEAST_SPREAD * gain_std_db):
         return False
+    return _follows_range(levels, fix, shape) < 0.5
+
+
+def _expected_db(fix: SourceFix, shape: ArrayShape) -> NDArray[np.float64]:
+    ranges = np.linalg.norm(shape.p_AM - fix.p_AS, axis=1)
+    return -20.0 * np.log10(np.maximum(ranges, 1e-3))
+
+
+def _follows_range(
+    levels: NDArray[np.float64], fix: SourceFix, shape: ArrayShape
+) -> float:
+    """Returns how far levels vary as those of a source: 1 as there, 0 not at all."""
+    expected = _expected_db(fix, shape)
     expected -= expected.mean()
     measured = 20.0 * np.log10(np.maximum(levels, 1e-300))
-    return bool(measured @ expected < 0.5 * (expected @ expected))
+    return float(measured @ expected) / max(float(expected @ expected), 1e-30)
 
 
 class DelayScale(NamedTuple):

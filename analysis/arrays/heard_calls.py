@@ -7,7 +7,7 @@ import numpy as np
 from analysis.arrays.array_geometry import KnownArray
 from analysis.arrays.call_placement import place_call
 from analysis.arrays.call_search import CallSearch
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.recording_search import Sighting
 from analysis.arrays.recording_spectra import RecordingSpectra
 from analysis.arrays.source_estimate import SourceEstimate

@@ -72,7 +72,7 @@ def sightings_of(
             "within it; correct from_s and to_s",
         )
     part = slice(round(from_s * rate), round(end * rate))
-    recording, faults = prepared_recording(
+    recording, faults, _ = prepared_recording(
         recorded._replace(samples=recorded.samples[:, part]),
         geometry,
         top_hz=top_hz,

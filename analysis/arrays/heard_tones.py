@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from analysis.arrays.array_geometry import KnownArray
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.far_field import locate_far_source
 from analysis.arrays.recording_search import Sighting
 from analysis.arrays.recording_spectra import RecordingSpectra

@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_geometry import ArrayGeometry
-from analysis.arrays.channel_faults import ChannelFault, find_channel_faults
+from analysis.arrays.channel_changes import (
+    ChannelDelays,
+    dying_channel,
+    slipping_channels,
+    stretch_delays,
+)
+from analysis.arrays.channel_fault import ChannelFault
+from analysis.arrays.channel_faults import find_channel_faults
+from analysis.arrays.channel_timing import LagSearch
 from analysis.arrays.clock_drift import STRETCH_S, clock_drift, common_lags
 
 # _CLIPPED: magnitude that counts as full scale.
@@ -32,6 +40,9 @@ _DEAD_DB, _LEAST_DB = 40.0, -75.0
 # - _FIRST_LOOKS: number of the first looks.
 # - _LATER: stretches from a later look to the next look.
 _TOGETHER, _TOLD, _NEXT, _FIRST_LOOKS, _LATER = 6, 4, 6, 3, 60
+
+# Number of stretches in which a channel that changes is searched.
+_CHANGES = 40
 
 # Largest number of stretches whose delays are used. If there are twice as many, every
 # second stretch is dropped.
@@ -69,6 +80,17 @@ class LiveFaults:
         self._held: list[NDArray[np.float32]] = []
         self._stretches: list[NDArray[np.float32]] = []
         self._lags: list[tuple[float, NDArray[np.float64]]] = []
+        self._delays: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
+        self._search = (
+            LagSearch.of(
+                self._known,
+                float(self.sample_rate_hz),
+                self.geometry.band,
+                self._alive,
+            )
+            if len(self._alive) > 2
+            else None
+        )
         self._pending: Future[list[ChannelFault]] | None = None
         self._next, self._due = self._count + _TOGETHER, 0
 
@@ -99,6 +121,7 @@ class LiveFaults:
         self._stretches = [*self._stretches, stretch][-_TOGETHER:]
         yield from _clipped(stretch)
         yield from _dead(stretch)
+        yield from self._change(stretch)
         yield from self._drift(stretch)
         if self._pending is not None:
             if self._count < self._due or not self._is_done(self._pending):
@@ -126,6 +149,7 @@ class LiveFaults:
             self._known,
             sample_rate_hz=float(self.sample_rate_hz),
             band_hz=self.geometry.band,
+            omitted=[k for k in range(self._known.shape.count) if k not in self._alive],
         )
 
     def _is_done(self, pending: Future[list[ChannelFault]]) -> bool:
@@ -135,6 +159,20 @@ class LiveFaults:
         """
         spare = self._begun + _TOLD * STRETCH_S - time.monotonic()
         return bool(wait([pending], max(0.0, spare)).done)
+
+    def _change(self, stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
+        """Finds channels that lose samples, or the sound that the others have."""
+        if self._search is None:
+            return
+        t_s = (self._count - 0.5) * STRETCH_S
+        found = stretch_delays(stretch[self._alive], self._search)
+        self._delays = [*self._delays, (t_s, *found)][-_CHANGES:]
+        t, lags, levels = (np.array(part) for part in zip(*self._delays, strict=True))
+        delays = ChannelDelays(t, lags, levels)
+        fault = dying_channel(delays, self._search)
+        fault = fault or slipping_channels(delays, self._search)
+        if fault is not None:
+            yield fault
 
     def _drift(self, stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
         t_s = (self._count - 0.5) * STRETCH_S

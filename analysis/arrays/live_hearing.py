@@ -16,7 +16,7 @@ from analysis.arrays.array_geometry import (
     ArrayGeometry,
     usable_band,
 )
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault, channel_names
 from analysis.arrays.live_faults import LiveFaults
 from analysis.arrays.prepared_recording import chosen_microphones
 from analysis.arrays.recorded_samples import array_mismatch
@@ -31,7 +31,13 @@ from analysis.arrays.voting.source_listener import (
 from systems.framework.input_error import InputError
 
 # Kinds of faults that make bearings wrong. Only the user can correct them.
-_FATAL = ("copied", "swapped", "units", "drift")
+_FATAL = ("copied", "swapped", "units", "speed")
+
+# Kinds of faults whose channels are left out.
+_LEFT_OUT = ("dead", "unaligned", "slipped", "drift")
+
+# Kinds of faults that do not make the bearings before them wrong.
+_RECENT = ("dead", "slipped")
 
 # Least number of channels that go on without a dead one.
 _LEAST_LEFT = 3
@@ -171,27 +177,33 @@ class LiveHearing:
     def _mend(self, fault: ChannelFault, looks: LiveFaults) -> None:
         """Reports a fault, and continues without its effect if possible.
 
-        An inverted channel is corrected, and a dead channel is left out.
+        An inverted channel is corrected. Channels that are dead, or not aligned in time
+        with most others, are left out.
         """
-        if fault.kind == "dead" and not set(fault.channels) & set(self._alive):
+        if fault.kind in _LEFT_OUT and not set(fault.channels) & set(self._alive):
             return
         if fault.kind in _FATAL:
             raise self._end(fault.message)
+        message = fault.message
         if fault.kind == "inverted":
             self._signs[list(fault.channels)] *= -1.0
-        elif fault.kind == "dead":
-            self._leave_out(fault)
-        self._name(fault.message, (fault.kind, *fault.channels))
-        if fault.kind in ("inverted", "dead"):
+        elif fault.kind in _LEFT_OUT:
+            message = self._leave_out(fault)
+        self._name(message, (fault.kind, *fault.channels))
+        if fault.kind == "inverted" or fault.kind in _LEFT_OUT:
             looks.begin(self._alive)
-            # Tracks from an inverted channel are wrong.
-            keeps_tracks = fault.kind == "dead"
+            keeps_tracks = fault.kind in _RECENT
             self._memory = self._memory.after_gap(self._plan, keeps_tracks=keeps_tracks)
 
-    def _leave_out(self, fault: ChannelFault) -> None:
-        self._alive = [k for k in self._alive if k not in fault.channels]
+    def _leave_out(self, fault: ChannelFault) -> str:
+        """Leaves out the smaller part of the channels, and returns the message."""
+        out = [k for k in self._alive if k in fault.channels]
+        others = [k for k in self._alive if k not in fault.channels]
+        if len(out) > len(others):
+            out, others = others, out
+        self._alive = others
         try:
-            left = chosen_microphones(self._geometry, self._alive)
+            left = chosen_microphones(self._geometry, others)
         except ValueError:
             left = None
         # Two channels that are left would silently confuse front and back.
@@ -201,6 +213,9 @@ class LiveHearing:
             raise self._end(
                 f"{fault.message}; the remaining channels give no bearings"
             ) from None
+        if "left out" in fault.message:
+            return fault.message
+        return f"{fault.message}; {channel_names(out)} left out"
 
     def _end(self, fault: str) -> StreamBrokenError:
         self.heard.faults.append(fault)

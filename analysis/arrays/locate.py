@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
 from analysis.arrays.call_search import CallSearch
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.far_field import locate_far_source
 from analysis.arrays.heard_calls import arrivals_alike, heard_calls
 from analysis.arrays.heard_sources import HeardSource, HeardSources, heard_sources
@@ -50,8 +50,8 @@ _ANY_STD_DEG = 180.0 / math.sqrt(3.0)
 _ULTRASOUND_HZ, _CALLS_S, _WIDEST = 10_000.0, 0.005, 20_000.0
 
 
-# Faults that make channels appear late.
-_EXPLAINS_LATENESS = ("size", "near", "reflector")
+# Faults that make channels appear late, or leave out channels.
+_EXPLAINS_LATENESS = ("size", "near", "dead", "slipped", "directional", "reflector")
 
 
 class HeardRecording(NamedTuple):
@@ -67,6 +67,8 @@ class HeardRecording(NamedTuple):
     estimates: list[SourceEstimate]
     """Estimated source positions, for the sightings whose delays fit a position."""
     faults: list[ChannelFault]
+    geometry: ArrayGeometry
+    """The array without the microphones that are left out."""
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -91,6 +93,7 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
             remedy.
     """
     heard = hear(recorded, geometry)
+    geometry = heard.geometry
     known, spectra, search = geometry.known, heard.recording, heard.search
     shape = known.shape
     array = {
@@ -155,24 +158,24 @@ def _with_errors(source: HeardSource, array: KnownArray) -> HeardSource:
 
 def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
     """Finds the delays and positions of the source in a recording in memory."""
-    recording, faults = prepared_recording(recorded, geometry)
-    known = geometry.known
+    recording, faults, used = prepared_recording(recorded, geometry)
+    known = used.known
     search, sightings, estimates = _estimates(recording, known)
     if isinstance(search, CallSearch):
         faults += arrivals_alike(sightings, known)
-        return HeardRecording(recording, search, sightings, estimates, faults)
+        return HeardRecording(recording, search, sightings, estimates, faults, used)
     if isinstance(search, ToneSearch):
         if not estimates:
             faults += unclear_tone(search, known)
-        return HeardRecording(recording, search, sightings, estimates, faults)
+        return HeardRecording(recording, search, sightings, estimates, faults, used)
     # A faulty channel has another spectrum than the others without any reflector.
     reflector = None if faults else near_reflector(recording)
     if reflector is not None:
         faults.append(reflector)
-    late = late_channel(sightings, known)
-    if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
-        faults.append(late)
-    return HeardRecording(recording, search, sightings, estimates, faults)
+    if not any(f.kind in _EXPLAINS_LATENESS for f in faults):
+        late = late_channel(sightings, known)
+        faults += [] if late is None else [late]
+    return HeardRecording(recording, search, sightings, estimates, faults, used)
 
 
 _Heard = tuple[

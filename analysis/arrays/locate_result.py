@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from analysis.arrays.agreed_sources import AgreedSources, agree_sources
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.heard_sources import HeardSources
 from analysis.arrays.place_medians import median, median_angle, usual, wrapped_deg
 from analysis.arrays.source_estimate import SourceEstimate

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.recording_spectra import RecordingSpectra
 
 # Width of the frequency bands, Hz. It separates reflections before about 2 ms from

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,10 @@ from analysis.arrays.array_geometry import (
     ArrayGeometry,
     usable_band,
 )
-from analysis.arrays.channel_faults import ChannelFault, find_channel_faults
+from analysis.arrays.channel_changes import recorded_change
+from analysis.arrays.channel_fault import ChannelFault
+from analysis.arrays.channel_faults import find_channel_faults
+from analysis.arrays.channel_timing import LagSearch
 from analysis.arrays.clock_drift import recording_drift
 from analysis.arrays.frame_delays import exchanged
 from analysis.arrays.processed_channels import processed_channel
@@ -36,7 +41,10 @@ SNAPSHOTS = (8, 32, 128)
 LEAST_SIGHTINGS = 3
 
 # Kinds of faults that make it impossible to locate a source.
-_FATAL = ("nan", "dead", "copied", "units", "drift")
+_FATAL = ("nan", "dead", "copied", "units", "speed", "unaligned", "drift")
+
+# Kinds of faults whose channels have the wrong sign.
+_NEGATIVE = ("inverted", "directional")
 
 # Largest share of audible sound in a recording of ultrasound, and least share of the
 # power of such a recording that belongs to its sounds.
@@ -47,6 +55,16 @@ _OF_DELAYS = ("drift", "geometry", "size", "swapped", "units")
 
 # Largest number of channels in one message.
 _MOST_NAMED = 8
+
+
+class PreparedRecording(NamedTuple):
+    """A recording without the faults that can be corrected."""
+
+    spectra: RecordingSpectra
+    faults: list[ChannelFault]
+    """Faults of channels that are corrected, left out, or doubtful."""
+    geometry: ArrayGeometry
+    """The array without the microphones that are left out."""
 
 
 def chosen_microphones(geometry: ArrayGeometry, chosen: Sequence[int]) -> ArrayGeometry:
@@ -74,12 +92,13 @@ def prepared_recording(
     *,
     top_hz: float = math.inf,
     trusts_positions: bool = True,
-) -> tuple[RecordingSpectra, list[ChannelFault]]:
+) -> PreparedRecording:
     """Returns the spectra of the array's channels, and the faults worth reporting.
 
-    Inverted channels are corrected. Frequencies above ``top_hz`` are not used, but the
-    band is at least 500 Hz wide. If the positions of the microphones are uncertain,
-    delays cannot reveal exchanged channels or drifting clocks.
+    Inverted channels are corrected, and channels that change within the recording are
+    left out. Frequencies above ``top_hz`` are not used, but the band is at least 500 Hz
+    wide. If the positions of the microphones are uncertain, delays cannot reveal these
+    changes, exchanged channels or drifting clocks.
     """
     samples, rate, where = recorded.samples, recorded.rate, recorded.name
     known = geometry.known
@@ -104,10 +123,14 @@ def prepared_recording(
     processed = processed_channel(samples, geometry.columns, shape, known.c, rate)
     if processed is not None:
         raise InputError("recording", f"{where}: {_not_of_a_microphone(*processed)}")
-    drift = None
-    if trusts_positions and not known.far_apart:
-        drift = recording_drift(channels, float(rate), shape.p_AM, known.c)
+    change = drift = None
+    delays_tell = trusts_positions and not known.far_apart
+    if delays_tell and np.isfinite(channels).all():
+        change = _change(channels, geometry, float(rate), where)
+        if change is None:
+            drift = recording_drift(channels, float(rate), shape.p_AM, known.c)
     faults = [] if drift is None else [drift]
+    omitted = () if change is None else change.channels
     # The delays of drifting channels fit no position, so no other check of delays
     # applies.
     if drift is None or drift.kind != "drift":
@@ -116,6 +139,7 @@ def prepared_recording(
             known,
             sample_rate_hz=float(rate),
             band_hz=geometry.band or ((low, high) if low > LOWEST_HZ else None),
+            omitted=omitted,
         )
     if any(f.kind in _OF_DELAYS for f in faults):
         # Delays of tones are known except for whole periods.
@@ -123,8 +147,13 @@ def prepared_recording(
         if tones.are_most:
             faults = [fault for fault in faults if fault.kind not in _OF_DELAYS]
     if not trusts_positions:
-        faults = [fault for fault in faults if fault.kind != "swapped"]
+        faults = [f for f in faults if f.kind not in ("swapped", "speed")]
     channels, faults = channels_without_faults(channels, faults, agreement, where)
+    if change is not None:
+        left = [k for k in range(shape.count) if k not in omitted]
+        geometry, channels = chosen_microphones(geometry, left), channels[left]
+        faults = [change, *faults]
+        shape = geometry.known.shape
     recording = spectra(channels)
     if not recording.starts.size and not known.far_apart:
         raise InputError(
@@ -133,7 +162,24 @@ def prepared_recording(
             f"array of {shape.aperture_m:.3g} m; record at least "
             f"{1e3 * recording.least_samples / rate:.3g} ms",
         )
-    return recording, faults
+    return PreparedRecording(recording, faults, geometry)
+
+
+def _change(
+    channels: NDArray[np.float64], geometry: ArrayGeometry, rate: float, where: str
+) -> ChannelFault | None:
+    """Finds channels that change, and rejects a recording with too few others."""
+    numbers = range(len(channels))
+    search = LagSearch.of(geometry.known, rate, geometry.band, numbers)
+    change = recorded_change(channels, search)
+    if change is None:
+        return None
+    try:
+        left = [k for k in numbers if k not in change.channels]
+        chosen_microphones(geometry, left)
+    except ValueError:
+        raise InputError("recording", f"{where}: {change.message}") from None
+    return replace(change, message=f"{change.message}; it is left out")
 
 
 def _not_of_a_microphone(channel: int, observation: str) -> str:
@@ -189,12 +235,14 @@ def channels_without_faults(
     fatal = [fault for fault in faults if fault.kind in _FATAL]
     if fatal:
         first, *rest = fatal
-        further = sorted({k + 1 for f in rest for k in f.channels if f is not first})
+        further = sorted(
+            {k + 1 for f in rest for k in f.channels if k not in first.channels}
+        )
         names = ", ".join(map(str, further[:_MOST_NAMED]))
         names += " ..." if len(further) > _MOST_NAMED else ""
-        more = f"; check channels {names} as well" if rest else ""
+        more = f"; check channels {names} as well" if further else ""
         raise InputError("recording", f"{where}: {first.message}{more}")
-    inverted = [k for f in faults if f.kind == "inverted" for k in f.channels]
+    inverted = [k for f in faults if f.kind in _NEGATIVE for k in f.channels]
     if inverted:
         samples = samples.copy()
         samples[inverted] *= -1.0

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.array_geometry import KnownArray
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.recording_search import MAD_TO_STD, Sighting
 from analysis.arrays.source_placement import tolerance
 from analysis.arrays.wave_fronts import wave_front

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.heard_sources import FollowedSource, HeardSource, HeardSources
 from analysis.arrays.locate_result import LocatedSource
 from analysis.arrays.locate_text import locate_text

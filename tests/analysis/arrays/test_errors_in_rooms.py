@@ -14,8 +14,8 @@ from analysis.arrays.voting.source_listener import (
 from phonotaxis import locate
 from studies.support.hearing_cases.errors_in_rooms import (
     ARRAYS,
-    C,
     RATE,
+    C,
     geometry,
     recorded,
 )

@@ -147,7 +147,9 @@ def test_calibration_takes_files_and_start_times(tmp_path):
         "sounds:\n- recording: [mic1.wav, mic2.wav, mic3.wav, mic4.wav]\n"
         f"  starts_s: {list(STARTS_S)}\n  position_m: {source.tolist()}\n"
     )
-    geometry = ArrayGeometry(microphones=SQUARE, temperature_c=20.0)
+    geometry = ArrayGeometry.model_validate(
+        {"microphones": SQUARE, "temperature_c": 20.0}
+    )
     document = calibrate(tmp_path / "sounds.yaml", geometry).document()
     assert document["remarks"] == []
     places = np.array(document["geometry"]["microphones"])

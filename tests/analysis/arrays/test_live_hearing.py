@@ -121,6 +121,33 @@ def test_positions_in_centimeters_end_it():
     assert "give positions in m (divide those in cm by 100" in heard.status
 
 
+def test_lost_samples_leave_out_their_channel():
+    """37 samples of channel 2 are lost at 3 s: it is left out, and the others go on."""
+    samples = FRIENDS[:, :-37].copy()
+    samples[1, 3 * RATE :] = FRIENDS[1, 3 * RATE + 37 :]
+    heard, told, named = hear(samples)
+    ((time_s, fault),) = named
+    assert fault.startswith("channel 2: 37 samples (2.31 ms) lost at 3.")
+    assert fault.endswith("; channel 2 left out")
+    assert 4.0 <= time_s <= 5.0
+    assert (heard.failed, heard.identities) == (False, {1})
+    late = [bearing for t, _, bearing in told if t > time_s + 0.5]
+    np.testing.assert_allclose(late, BEARING, atol=3.0)
+
+
+def test_a_late_channel_is_left_out():
+    samples = FRIENDS.copy()
+    samples[2] = np.roll(samples[2], 320)
+    heard, told, named = hear(samples[:, 320:])
+    ((time_s, fault),) = named
+    assert fault.startswith("channel 3 20.")
+    assert "late against channels 1, 2 and 4" in fault
+    assert fault.endswith("; channel 3 left out")
+    assert not heard.failed
+    late = [bearing for t, _, bearing in told if t > time_s + 0.5]
+    np.testing.assert_allclose(late, BEARING, atol=3.0)
+
+
 def test_an_inverted_channel_is_turned_back():
     samples = FRIENDS * np.array([[1.0], [1.0], [1.0], [-1.0]], np.float32)
     heard, told, named = hear(samples)

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from analysis.arrays.array_geometry import ArrayGeometry
-from analysis.arrays.channel_faults import ChannelFault
+from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.prepared_recording import (
     channels_without_faults,
     chosen_microphones,
+    prepared_recording,
 )
+from analysis.arrays.recorded_samples import RecordedSamples
 from systems.framework.input_error import InputError
+from tests.analysis.arrays.plane_waves import RATE, SOUND_SPEED, SQUARE, plane_waves
 
 PLACES = ((0.1, 0.0), (0.0, 0.1), (-0.1, 0.0), (0.0, -0.2))
 
@@ -45,6 +48,24 @@ def test_one_is_too_few():
         chosen_microphones(ArrayGeometry(microphones=PLACES), (0,))
 
 
+@pytest.mark.parametrize("k", [0, 2])
+def test_a_channel_that_dies_is_left_out(k):
+    samples = plane_waves(35.0, 6.0).astype(np.float64)
+    samples[k, 3 * RATE :] = 0.0
+    geometry = ArrayGeometry(microphones=SQUARE, sound_speed=SOUND_SPEED)
+    recorded = RecordedSamples(samples, RATE, "a.wav")
+    prepared = prepared_recording(recorded, geometry)
+    assert prepared.geometry.columns == tuple(i for i in range(4) if i != k)
+    assert len(prepared.spectra.channels) == 3
+    (fault,) = prepared.faults
+    assert (fault.kind, fault.channels) == ("dead", (k,))
+    assert fault.message.endswith("it is left out")
+    # Two channels of three are too few.
+    three = chosen_microphones(geometry, (0, 1, 2))
+    with pytest.raises(ValueError, match=rf"channel {k + 1}: dead, silent from 3\."):
+        prepared_recording(recorded, three)
+
+
 SAMPLES = np.arange(12.0).reshape(3, 4) - 5.0
 
 
@@ -64,7 +85,9 @@ def agrees_with(order):
 AS_GIVEN = agrees_with([0, 1, 2])
 
 
-@pytest.mark.parametrize("kind", ["nan", "dead", "copied", "units"])
+@pytest.mark.parametrize(
+    "kind", ["nan", "dead", "copied", "units", "speed", "unaligned"]
+)
 def test_nothing_to_locate_with(kind):
     with pytest.raises(ValueError, match=rf"a.wav: {kind} \(1,\)"):
         channels_without_faults(
@@ -80,12 +103,12 @@ def test_all_channels_that_are_of_no_use_are_named():
 
 def test_a_message_names_a_few_of_many_channels():
     found = [fault("copied", 0, k) for k in range(1, 64)]
-    with pytest.raises(ValueError, match=r"check channels 1, 3, 4, .*\.\.\.") as caught:
+    with pytest.raises(ValueError, match=r"check channels 3, 4, .*\.\.\.") as caught:
         channels_without_faults(SAMPLES, found, AS_GIVEN, "")
     assert len(str(caught.value)) < 100
 
 
-@pytest.mark.parametrize("kind", ["late", "size", "geometry"])
+@pytest.mark.parametrize("kind", ["late", "size", "geometry", "apart", "near"])
 def test_doubtful_estimates_are_said(kind):
     samples, faults = channels_without_faults(SAMPLES, [fault(kind, 1)], AS_GIVEN, "")
     np.testing.assert_array_equal(samples, SAMPLES)

@@ -66,6 +66,7 @@ def test_a_far_talker_has_all_votes(places, azimuth, elevation):
     (source,) = gather_sources(votes)
     assert math.degrees(source.bearing) == pytest.approx(azimuth, abs=0.5)
     assert source.elevation is not None
+    assert source.elevation is not None
     assert math.degrees(source.elevation) == pytest.approx(elevation, abs=1.5)
     assert source.share > 0.95
     assert source.confidence == pytest.approx(1.0)
