@@ -156,6 +156,7 @@ def test_a_steep_talker_is_one_source(elevation):
     (source,) = gather_sources(votes_of(places, samples))
     off = math.degrees(source.bearing) - 50.0
     assert abs(off) <= max(1.0, 3.0 * math.degrees(source.bearing_std))
+    assert source.elevation is not None
     assert math.degrees(source.elevation) == pytest.approx(elevation, abs=2.0)
 
 
