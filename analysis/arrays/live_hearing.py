@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,13 @@ _LEFT_OUT = ("dead", "unaligned", "slipped", "drift")
 
 # Kinds of faults that do not make the bearings before them wrong.
 _RECENT = ("dead", "slipped")
+
+# Kinds of faults that do not make bearings uncertain.
+_HARMLESS = ("clipped", "inverted", "moves")
+
+# Time for which bearings are uncertain after a fault that cannot be mended, s. The
+# channels are examined again at least twice in this time.
+_DOUBT_S = 60.0
 
 # Least number of channels that go on without a dead one.
 _LEAST_LEFT = 3
@@ -108,6 +115,7 @@ class LiveHearing:
         self._named: set[Hashable] = set()
         self._alive = list(range(len(geometry.microphones)))
         self._signs = np.ones((len(self._alive), 1), np.float32)
+        self._doubted_until_s = -math.inf
         with ExitStack() as stack:
             stack.callback(stream.close)
             if complaint:
@@ -142,6 +150,8 @@ class LiveHearing:
                 for step in steps:
                     self.heard.identities |= {track.identity for track in step.tracks}
                     power = max(_QUIET, float(np.mean(powers)))
+                    doubted = step.unfit or step.t_s < self._doubted_until_s
+                    step = replace(step, unfit=doubted)  # noqa: PLW2901
                     yield HeardStep(step, 10.0 * math.log10(power))
                     powers.clear()
             for fault in looks.finish():
@@ -180,17 +190,20 @@ class LiveHearing:
         An inverted channel is corrected. Channels that are dead, or not aligned in time
         with most others, are left out.
         """
-        if fault.kind in _LEFT_OUT and not set(fault.channels) & set(self._alive):
+        is_left_out = fault.kind in _LEFT_OUT and bool(fault.channels)
+        if is_left_out and not set(fault.channels) & set(self._alive):
             return
         if fault.kind in _FATAL:
             raise self._end(fault.message)
         message = fault.message
         if fault.kind == "inverted":
             self._signs[list(fault.channels)] *= -1.0
-        elif fault.kind in _LEFT_OUT:
+        elif is_left_out:
             message = self._leave_out(fault)
+        elif fault.kind not in _HARMLESS:
+            self._doubted_until_s = self.heard.seconds + _DOUBT_S
         self._name(message, (fault.kind, *fault.channels))
-        if fault.kind == "inverted" or fault.kind in _LEFT_OUT:
+        if fault.kind == "inverted" or is_left_out:
             looks.begin(self._alive)
             keeps_tracks = fault.kind in _RECENT
             self._memory = self._memory.after_gap(self._plan, keeps_tracks=keeps_tracks)

@@ -51,7 +51,7 @@ _NEGATIVE = ("inverted", "directional")
 _AUDIBLE, _LEAST_SHARE = 0.05, 0.02
 
 # Kinds of faults that follow from delays.
-_OF_DELAYS = ("drift", "geometry", "size", "swapped", "units")
+_OF_DELAYS = ("drift", "geometry", "size", "speed", "swapped", "unaligned", "units")
 
 # Largest number of channels in one message.
 _MOST_NAMED = 8
