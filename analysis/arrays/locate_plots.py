@@ -64,10 +64,10 @@ def plot_locate(result: LocatedSource) -> Figure:
 
 def _title(result: LocatedSource) -> str:
     heard = f"heard in {len(result.estimates)} of {result.frames} frames"
-    if result.heard.steady:
-        heard += "; steady sound: the number of sources is unknown"
-    elif len(result.heard.sources) > 1:
-        heard += f"; {len(result.heard.sources)} sources"
+    if result.agreed.doubt:
+        heard += f"; {result.agreed.doubt}: the number of sources is unknown"
+    elif len(result.agreed.sources) > 1:
+        heard += f"; {len(result.agreed.sources)} sources"
     summary = result.main_source()
     if not result.estimates or "range" in summary["observable"]:
         return heard
@@ -115,9 +115,9 @@ def _over_time(axes: Axes, result: LocatedSource, name: str) -> None:
 
 def _others(axes: Axes, result: LocatedSource, length: float) -> None:
     main = result.main_source()["bearing_deg"]
-    if main is None or len(result.heard.sources) < 2:
+    if main is None or len(result.agreed.sources) < 2:
         return
-    bearings = [source.bearing_deg for source in result.heard.sources]
+    bearings = [source.bearing_deg for source in result.agreed.sources]
     off = [abs((bearing - main + 180.0) % 360.0 - 180.0) for bearing in bearings]
     del bearings[int(np.argmin(off))]
     for k, bearing in enumerate(bearings):
@@ -131,7 +131,7 @@ def _middle_deg(result: LocatedSource, main: float) -> float:
 
     If there are fewer than two sources, it is the bearing of the main source.
     """
-    bearings = np.sort([source.bearing_deg for source in result.heard.sources])
+    bearings = np.sort([source.bearing_deg for source in result.agreed.sources])
     if len(bearings) < 2:
         return main
     gaps = np.diff(bearings, append=bearings[0] + 360.0)
@@ -141,9 +141,9 @@ def _middle_deg(result: LocatedSource, main: float) -> float:
 
 def _tracks(axes: Axes, result: LocatedSource, middle: float) -> None:
     """Plots each track in its own color if there are several. Pauses stay blank."""
-    if len(result.heard.tracks) < 2:
+    if len(result.agreed.tracks) < 2:
         return
-    for k, track in enumerate(result.heard.tracks):
+    for k, track in enumerate(result.agreed.tracks):
         t_s, bearing = np.array(track.t_s), np.array(track.bearing_deg)
         around = middle + (bearing - middle + 180.0) % 360.0 - 180.0
         steps = np.diff(around, prepend=around[0]), np.diff(t_s, prepend=t_s[0])

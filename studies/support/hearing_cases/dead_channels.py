@@ -91,7 +91,7 @@ def _sound_one(name: str, place: int, t60_s: float) -> Outcome:
     near = flagged or float(off_by_deg(bearing, truth)) < max(3.0 * std, 5.0)
     claims = any(
         heard.confidence > CLAIM and off_by_deg(heard.bearing_deg, truth) > 15.0
-        for heard in result.heard.sources
+        for heard in result.agreed.sources
     )
     return Outcome(near and "dead" not in kinds, said, claims)
 

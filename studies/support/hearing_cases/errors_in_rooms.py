@@ -142,7 +142,7 @@ def _located(array: str, t60_s: float, seed: int) -> Outcome:
     level = abs(turned) < max(3.0 * turned_std, 5.0)
     claims = [
         source
-        for source in found.heard.sources
+        for source in found.agreed.sources
         if source.confidence > CLAIM
         and abs(math.remainder(source.bearing_deg - drawn.bearing_deg, 360.0)) > 15.0
     ]

@@ -102,7 +102,7 @@ def judged(
     off = angle_off_deg(bearing, truth, places)
     false = [
         source
-        for source in result.heard.sources
+        for source in result.agreed.sources
         if source.confidence > CLAIM
         and angle_off_deg(source.bearing_deg, truth, places) > 3.0 * _OFF_DEG
     ]

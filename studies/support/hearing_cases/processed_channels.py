@@ -68,7 +68,7 @@ def _judged(name: str, how: str, snr_db: float, *, first: bool) -> Outcome:
         return Outcome(first and "channel 1: processed" in str(error), str(error))
     bearing = found.main_source()["bearing_deg"]
     near = bearing is not None and abs(bearing - 50.0) < 5.0
-    claims = any(source.confidence > CLAIM for source in found.heard.sources)
+    claims = any(source.confidence > CLAIM for source in found.agreed.sources)
     said = f"{bearing}, {' '.join(found.notes)}"
     return Outcome(near and not first, said, claims and not near)
 

@@ -85,7 +85,7 @@ def _judged(name: str, bearing_deg: float, rate: int, kind: _Kind) -> Outcome:
     if bearing is None:
         return Outcome(right=False, said=said)
     off = abs((bearing - bearing_deg + 180.0) % 360.0 - 180.0)
-    claims = any(source.confidence > CLAIM for source in found.heard.sources)
+    claims = any(source.confidence > CLAIM for source in found.agreed.sources)
     near = off <= max(3.0 * std, 5.0)
     noted = kind.says in notes if kind.says else not notes
     return Outcome(near and noted, said, claims and not near)

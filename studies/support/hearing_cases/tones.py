@@ -116,7 +116,7 @@ def _judge(
     named = any(fault.kind == "tone" for fault in result.faults)
     claims = any(
         s.confidence > 0.5 and min(_off(s.bearing_deg, b) for b in true) > 10.0
-        for s in result.heard.sources
+        for s in result.agreed.sources
     )
     if told["bearing_deg"] is None:
         place = np.array(sounds[0][1]) - center

@@ -118,7 +118,7 @@ def _judge(pair: Pair) -> Outcome:
     false = any(
         source.confidence > CLAIM
         and angle_off_deg(source.bearing_deg, pair.place, pair.places) > _CLAIM_OFF_DEG
-        for source in result.heard.sources
+        for source in result.agreed.sources
     )
     return Outcome(right and not false, said, false)
 
