@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
+    from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
     from phonotaxis.listening import ListenResult, listen
     from phonotaxis.loops import DesignResult, StabilityResult, design, stability
     from phonotaxis.recordings import (
@@ -38,6 +39,7 @@ __all__ = [
     "ArrayGeometry",
     "CalibrationResult",
     "ComparisonResult",
+    "DelayResult",
     "DesignResult",
     "InputError",
     "ListenResult",
@@ -53,6 +55,7 @@ __all__ = [
     "SweepResult",
     "__version__",
     "calibrate",
+    "calibrate_delays",
     "columns",
     "compare",
     "design",
@@ -60,6 +63,7 @@ __all__ = [
     "listen",
     "load_scenario",
     "locate",
+    "locate_delays",
     "main",
     "simulate",
     "stability",
@@ -74,6 +78,7 @@ _HOMES = {
     "ArrayGeometry": "analysis.arrays.array_geometry",
     "CalibrationResult": "phonotaxis.recordings",
     "ComparisonResult": "phonotaxis.batches",
+    "DelayResult": "phonotaxis.delays",
     "DesignResult": "phonotaxis.loops",
     "InputError": "systems.framework.input_error",
     "ListenResult": "phonotaxis.listening",
@@ -88,6 +93,7 @@ _HOMES = {
     "SweepPlan": "analysis.batches.plan",
     "SweepResult": "phonotaxis.batches",
     "calibrate": "phonotaxis.recordings",
+    "calibrate_delays": "phonotaxis.delays",
     "columns": "analysis.runs.columns",
     "compare": "phonotaxis.batches",
     "design": "phonotaxis.loops",
@@ -95,6 +101,7 @@ _HOMES = {
     "listen": "phonotaxis.listening",
     "load_scenario": "diagrams.scenario.loading",
     "locate": "phonotaxis.recordings",
+    "locate_delays": "phonotaxis.delays",
     "simulate": "phonotaxis.runs",
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",

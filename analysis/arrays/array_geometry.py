@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, ValidationError, model_validator
 
-from analysis.arrays.array_budget import ArrayBudget
+from analysis.arrays.array_budget import ArrayBudget, rotations
 from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
@@ -112,6 +113,9 @@ class ArrayGeometry(Parameters):
     """Covariance of the microphone coordinates, m^2, instead of ``position_std_m``.
     Give the covariance of one microphone, which then applies to all. Or give the
     covariance of all coordinates in the order of the microphones."""
+    orientation_std_deg: float = Field(default=0.0, ge=0.0, le=90.0)
+    """Standard deviation of the orientation of the whole array about each axis, deg. It
+    adds to the errors of the positions."""
     sound_speed_std: float | None = Field(default=None, ge=0.0, le=400.0)
     """Standard deviation of the speed of sound, m/s. None: the value that follows from
     the standard deviation of the temperature. If the file states nothing about the air,
@@ -207,7 +211,8 @@ class ArrayGeometry(Parameters):
     def known(self) -> KnownArray:
         """The array with the errors of its description, as the estimators need it."""
         shape = ArrayShape.of(self.microphones)
-        of_places = self._of_places(shape)
+        turns = math.radians(self.orientation_std_deg) * rotations(shape.p_AM)
+        of_places = self._of_places(shape) + turns @ turns.T
         return KnownArray(
             shape=shape if self.side is None else shape.facing(self.side),
             c=self.c,
