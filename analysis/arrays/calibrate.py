@@ -247,14 +247,14 @@ def _uncertainty(calibration: Calibration) -> dict[str, Any]:
             return {"position_covariance_m2": rows}
     places = calibration.places
     turns = rotations(places)
-    towards = np.linalg.pinv(turns, rcond=1e-9)
     # Turns of the whole array are not independent errors of its microphones.
-    shape = np.eye(len(symmetric)) - turns @ towards
-    variances = np.diag(shape @ symmetric @ shape.T).reshape(places.shape)
-    turned = np.diag(towards @ symmetric @ towards.T)
+    turned = turns @ np.linalg.pinv(turns, rcond=1e-9)
+    shape = np.eye(len(symmetric)) - turned
+    variances = np.diag(shape @ symmetric @ shape).reshape(places.shape)
+    of_turns = np.trace(turned @ symmetric @ turned) / np.trace(turns @ turns.T)
     return {
         "position_std_m": np.sqrt(variances.mean(axis=1)).tolist(),
-        "orientation_std_deg": math.degrees(math.sqrt(turned.max())),
+        "orientation_std_deg": math.degrees(math.sqrt(of_turns)),
     }
 
 
