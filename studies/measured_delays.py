@@ -44,7 +44,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Iterator[Table]:
     """Yields the errors of the bearings before and after the calibration."""
     data = json.loads(options.delays.read_text("utf-8"))
-    # (loudspeakers, angles, microphones - 1)
+    # Axes: loudspeakers, angles, microphones.
     delays = np.array(data["delays"]).transpose(2, 1, 0)
     stated = ArrayGeometry(
         microphones=tuple(map(tuple, np.array(data["microphones"]).T)),

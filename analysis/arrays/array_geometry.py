@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -19,6 +19,7 @@ from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Point, Positive
 from systems.sound.acoustics import SOUND_SPEED_M_S, sound_speed
 from systems.sound.array_shape import ArrayShape
+from systems.sound.rigid_sphere import RigidSphere
 
 # Largest distance between two microphones, m. Larger distances mean that the positions
 # are not in meters.
@@ -50,6 +51,10 @@ _TEMPERATURE_C, _SPEED_SHARE = 2.0, 0.01
 # Tolerance for the symmetry and the eigenvalues of a covariance, as a share of its
 # largest variance.
 _ROUNDING = 1e-6
+
+# Largest distance of a microphone from the surface of its body, as a share of the
+# radius.
+_OFF_BODY = 0.1
 
 # Pairs of fields of which a geometry states at most one.
 _ALTERNATIVES = (
@@ -85,6 +90,19 @@ class KnownArray:
     """Standard deviation of a channel's gain, dB."""
     largest_range_error: float = 0.2
     """Largest standard deviation of a reported range, as a share of the range."""
+
+    @property
+    def misplaced_m(self) -> float:
+        """Standard deviation of positions whose delays are those of free air, m."""
+        body = self.shape.body
+        return math.hypot(self.budget.position_std, body.bend_std_m if body else 0.0)
+
+
+class ArrayBody(Parameters):
+    """A body that carries the microphones on its surface."""
+
+    sphere_m: float = Field(ge=0.005, le=1.0)
+    """Radius of a rigid sphere, m. Its center is the origin of the positions."""
 
 
 class ArrayGeometry(Parameters):
@@ -136,6 +154,9 @@ class ArrayGeometry(Parameters):
     None: both sides are possible, and the mirrored direction is reported as an
     alternative."""
 
+    body: ArrayBody | None = None
+    """Body that carries the microphones. None: free air."""
+
     @model_validator(mode="after")
     def _check(self) -> ArrayGeometry:
         count = len(self.microphones)
@@ -168,6 +189,7 @@ class ArrayGeometry(Parameters):
                 f"{_LARGEST_M:g} m apart",
             )
         self._check_budget(shape)
+        self._check_body()
         if self.side is not None:
             shape.facing(self.side)
         return self
@@ -193,6 +215,20 @@ class ArrayGeometry(Parameters):
         if covariance is not None:
             _check_covariance(covariance, shape)
 
+    def _check_body(self) -> None:
+        if self.body is None:
+            return
+        radius = self.body.sphere_m
+        off = np.abs(np.linalg.norm(self.microphones, axis=1) - radius)
+        k = int(off.argmax())
+        if off[k] > _OFF_BODY * radius:
+            raise InputError(
+                "body",
+                f"microphone {k + 1} is {1e3 * off[k]:.3g} mm off a sphere of "
+                f"{1e3 * radius:.4g} mm around the origin; give positions from the "
+                "center of the sphere, in m",
+            )
+
     @property
     def columns(self) -> tuple[int, ...]:
         """Columns of the recording to use, one per microphone."""
@@ -213,10 +249,22 @@ class ArrayGeometry(Parameters):
         shape = ArrayShape.of(self.microphones)
         turns = math.radians(self.orientation_std_deg) * rotations(shape.p_AM)
         of_places = self._of_places(shape) + turns @ turns.T
+        delay_std, speed_std = self.delay_std_s, self._speed_std()
+        if self.body is not None:
+            towards = np.array(self.microphones)
+            towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+            band = self.band or (LOWEST_HZ, HIGHEST_FAULTS_HZ)
+            body = RigidSphere(towards, self.body.sphere_m, band, self.c)
+            p = body.scale * np.array(self.microphones)
+            shape = replace(ArrayShape.of(p), body=body)
+            of_places = body.scale**2 * of_places
+            delay_std = math.hypot(delay_std, body.arrival_std_s)
+            # Delays that are too long by a share are those of slower sound.
+            speed_std = math.hypot(speed_std, body.scale_std * self.c)
         return KnownArray(
             shape=shape if self.side is None else shape.facing(self.side),
             c=self.c,
-            budget=ArrayBudget(of_places, self._speed_std(), self.delay_std_s),
+            budget=ArrayBudget(of_places, speed_std, delay_std),
             gain_std_db=self.gain_std_db,
             largest_range_error=self.largest_range_error,
         )

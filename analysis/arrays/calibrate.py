@@ -92,6 +92,7 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
     plausible, or if no recording contains a detectable sound.
     """
     places = np.array(geometry.microphones)
+    require_free_air(geometry)
     for k, listed in enumerate(sounds.sounds):
         path = sounds.path_of(listed)
         if listed.position_m is not None:
@@ -109,6 +110,14 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
     known = calibrated_geometry(first.calibration, geometry)
     top_hz = _top_hz(geometry, _shape_std(first))
     return _pass(sounds, geometry, known, top_hz)
+
+
+def require_free_air(geometry: ArrayGeometry) -> None:
+    """Raises ``InputError`` if the array has a body."""
+    if geometry.body is not None:
+        raise InputError(
+            "body", "arrays on a body cannot be calibrated; measure the positions"
+        )
 
 
 def _pass(

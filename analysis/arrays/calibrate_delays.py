@@ -11,7 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
 from analysis.arrays.array_geometry import ArrayGeometry
-from analysis.arrays.calibrate import CalibrationRun, calibration_run
+from analysis.arrays.calibrate import (
+    CalibrationRun,
+    calibration_run,
+    require_free_air,
+)
 from analysis.arrays.calibration import Calibration
 from analysis.arrays.calibration_sounds import MeasuredSound
 from analysis.arrays.given_delays import GivenSound, given_sounds
@@ -40,6 +44,7 @@ def calibrate_by_delays(
     position_std_m: float,
 ) -> CalibrationRun:
     """Calibrates an array; see ``phonotaxis.calibrate_delays``."""
+    require_free_air(geometry)
     given = given_sounds(delays, covariance, geometry.known)
     places = _positions(positions_m, len(given), len(geometry.microphones[0]))
     remarks = [_left_out(k, sound) for k, sound in enumerate(given) if sound.left_out]

@@ -134,7 +134,7 @@ def find_channel_faults(
             measured.levels,
             shape,
             c / sample_rate_hz,
-            position_std_m=array.budget.position_std,
+            position_std_m=array.misplaced_m,
             gain_std_db=array.gain_std_db,
         )
 
@@ -316,6 +316,7 @@ def _order(delays: FrameDelays) -> list[ChannelFault]:
         return []
     text = (
         f"channels: {100 * share:.0f} % of the delays fit no place outside the array; "
-        "check the microphones' positions (in m), their order and the speed of sound"
+        "check the microphones' positions (in m), their order and the speed of sound, "
+        "and state the 'body' if the microphones are on a sphere"
     )
     return [ChannelFault("geometry", (), text)]

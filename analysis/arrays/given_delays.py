@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays.array_geometry import KnownArray
+from analysis.arrays.body_delays import free_air_delays
 from systems.framework.input_error import InputError
 
 # Longest possible delay, as a multiple of the travel time between two microphones. On a
@@ -172,6 +173,7 @@ def _possible(
         else:
             blank += none
     tau = arrival[1:] - arrival[0]
+    tau = free_air_delays(tau, covariance + blank, shape, array.c)
     return GivenSound(tau, covariance, blank, left_out)
 
 

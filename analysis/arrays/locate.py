@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
+from analysis.arrays.body_delays import in_free_air
 from analysis.arrays.channel_faults import ChannelFault
 from analysis.arrays.heard_sources import heard_sources
 from analysis.arrays.locate_result import LocatedSource, SourceEstimate
@@ -162,15 +163,16 @@ def _clearest(heard: list[_Heard]) -> _Heard:
 
 
 def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _Heard:
+    shape = array.shape
     search = RecordingSearch(
         recording,
-        array.shape,
+        shape,
         array.c,
         snapshots,
-        slack_s=_SLACK * array.budget.position_std / array.c,
-        has_place=lambda delays: has_place(delays, array),
+        slack_s=_SLACK * array.misplaced_m / array.c,
+        has_place=lambda delays: has_place(in_free_air(delays, shape, array.c), array),
     )
-    sightings = list(search.sightings())
+    sightings = [in_free_air(s, shape, array.c) for s in search.sightings()]
     placed = ((s.t_s, place_source(s, array)) for s in sightings)
     found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
     return search, sightings, found
