@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from analysis.runs.columns import columns
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
+    from phonotaxis.arrays import ResolutionResult, array_resolution
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
     from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
     from phonotaxis.listening import ListenResult, listen
@@ -44,6 +45,7 @@ __all__ = [
     "InputError",
     "ListenResult",
     "LocateResult",
+    "ResolutionResult",
     "Result",
     "RunError",
     "RunResult",
@@ -54,6 +56,7 @@ __all__ = [
     "SweepPlan",
     "SweepResult",
     "__version__",
+    "array_resolution",
     "calibrate",
     "calibrate_delays",
     "columns",
@@ -83,6 +86,7 @@ _HOMES = {
     "InputError": "systems.framework.input_error",
     "ListenResult": "phonotaxis.listening",
     "LocateResult": "phonotaxis.recordings",
+    "ResolutionResult": "phonotaxis.arrays",
     "Result": "phonotaxis.result",
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
@@ -92,6 +96,7 @@ _HOMES = {
     "StabilityResult": "phonotaxis.loops",
     "SweepPlan": "analysis.batches.plan",
     "SweepResult": "phonotaxis.batches",
+    "array_resolution": "phonotaxis.arrays",
     "calibrate": "phonotaxis.recordings",
     "calibrate_delays": "phonotaxis.delays",
     "columns": "analysis.runs.columns",
