@@ -36,10 +36,15 @@ DISTANCES_M = (0.5, 1.0, 2.0, 4.0, 8.0)
 # and rarely nearer than two apertures.
 _INVERSE_RANGE, _APERTURES = 1.0, 0.5
 
+# Prior standard deviation of an angle: nothing is known.
+_ANY_DIRECTION_RAD = 10.0
+# Prior standard deviation of an inverse range of which nothing is known, 1/m.
+_ANY_INVERSE_RANGE = 1e4
+
 # Standard deviation of an angle that counts as not observable, rad.
 _UNKNOWN_RAD = math.radians(60.0)
 
-# Steps of the search for the farthest range, per factor of 10.
+# Distances of the search for the farthest range, m.
 _RANGES = np.geomspace(NEAREST_M, FARTHEST_M, 88)
 
 
@@ -230,8 +235,9 @@ def _errors(
     root = whitening_matrix(noise + allowed)
     seen = root @ slopes
     information = seen.T @ seen
-    information[-1, -1] += prior**-2
-    covariance = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+    priors = np.full(len(information), _ANY_DIRECTION_RAD)
+    priors[-1] = prior
+    covariance = np.linalg.inv(information + np.diag(priors**-2.0))
     gain = covariance @ seen.T @ root
     return np.diag(covariance), np.diag(gain @ allowed @ gain.T)
 
@@ -253,7 +259,7 @@ def _range(
 ) -> tuple[float | None, float | None]:
     if len(slopes) < slopes.shape[1]:
         return None, None
-    whole, systematic = _errors(slopes, noise, allowed, math.inf)
+    whole, systematic = _errors(slopes, noise, allowed, _ANY_INVERSE_RANGE)
     std = distance_m**2 * math.sqrt(float(whole[-1]))
     if not 0.0 < std <= largest_error * distance_m:
         return None, None
@@ -285,6 +291,11 @@ def _improvements(geometry: ArrayGeometry, sounding: Sounding) -> list[Improveme
     changes = [
         ("as stated", known, std),
         ("exact positions", replace(known, budget=exact), std),
+        (
+            "exact sampling times",
+            replace(known, budget=replace(budget, delay_std=0.0)),
+            std,
+        ),
         (
             "exact speed of sound",
             replace(known, budget=replace(budget, speed_std=0.0)),

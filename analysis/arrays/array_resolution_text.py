@@ -61,14 +61,23 @@ def resolution_text(found: ArrayResolution) -> str:
     """Formats the report of ``phonotaxis array`` for a terminal."""
     shape, sound = found.geometry.known.shape, found.sounding
     low, high = sound.band_hz
-    lines = [
+    sizes = (
         f"{shape.count} microphones in a {shape.kind} of {100 * shape.aperture_m:.3g} "
-        f"cm, angles: {' and '.join(found.angles) or 'none'}; {_same(found)}",
+        f"cm, angles: {' and '.join(found.angles) or 'none'}; {_same(found)}"
+    )
+    heard = (
         f"sound of {sound.seconds:g} s, {sound.snr_db:g} dB over the noise, {low:g} to "
         f"{high:g} Hz, without echoes: arrival times to "
-        f"{1e6 * found.arrival_std_s:.2g} us",
+        f"{1e6 * found.arrival_std_s:.2g} us"
+    )
+    useful = (
         f"echoes of a room disturb most below {found.lowest_hz:.0f} Hz; tones above "
-        f"{found.highest_hz:.0f} Hz have several directions",
+        f"{found.highest_hz:.0f} Hz have several directions"
+    )
+    lines = [
+        sizes,
+        heard,
+        useful,
         "",
         "standard deviation (part from errors of array and air), far source",
         f"bearing/deg  {'bearing std/deg':>18}"
@@ -163,10 +172,12 @@ def _ranges(found: ArrayResolution) -> list[str]:
 
 
 def _better(found: ArrayResolution) -> list[str]:
-    lines = [
-        f"{'median':<22}{'bearing std/deg':>16}{'elevation std/deg':>19}"
-        f"{'farthest range/m':>18}"
-    ]
+    columns = (
+        ("bearing std/deg", 16),
+        ("elevation std/deg", 19),
+        ("farthest range/m", 18),
+    )
+    lines = [f"{'median':<22}" + "".join(f"{name:>{w}}" for name, w in columns)]
     lines += [
         f"{better.change:<22}{_number(better.bearing_std_deg, 16, 3)}"
         f"{_number(better.elevation_std_deg, 19, 3)}"
