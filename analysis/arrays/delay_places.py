@@ -26,6 +26,10 @@ from systems.sound.array_shape import ArrayShape
 # probability.
 _CHANCE = 1e-3
 
+# The misfit of a single sound counts up to the chi-square that chance exceeds with this
+# probability.
+_LEAST_CHANCE = 1e-4
+
 # Least and largest standard deviation of arrival times that is searched for, s.
 _LEAST_S, _LARGEST_S = 1e-10, 1.0
 
@@ -124,9 +128,13 @@ def delay_places(
     if covariance is None:
         std, freedom = common_arrival_std(sounds, array)
         common, widened = std, _widening(freedom)
+    elif _misfit_in_common(sounds, array):
+        common, freedom = _common_scale(sounds, array, 1.0, _LARGEST_FACTOR)
+        widened = _widening(freedom)
     origin = np.mean(np.array(geometry.microphones), axis=0)
     estimates = tuple(
-        _estimate(sound, array, origin, common, widened) for sound in sounds
+        _estimate(sound, array, origin, common, widened, stated=std is None)
+        for sound in sounds
     )
     return DelayPlaces(geometry, estimates, std)
 
@@ -136,12 +144,10 @@ def common_arrival_std(
 ) -> tuple[float, int]:
     """Estimates the standard deviation of independent arrival times from the misfit.
 
-    With it, half of the sounds fit as well as half of all sounds should. A few sounds
-    with gross errors therefore have little effect. Returns the value, s, and its
-    degrees of freedom. Raises ``InputError`` if the delays do not determine it.
+    Returns the value, s, and its degrees of freedom. Raises ``InputError`` if the
+    delays do not determine it.
     """
-    usable = [s for s in sounds if s.usable and _freedom(s, array) > 0]
-    if not usable:
+    if not _telling(sounds, array):
         unknowns = _solid(array.shape).unknowns
         raise InputError(
             "covariance",
@@ -150,7 +156,36 @@ def common_arrival_std(
             "'std**2 * (np.eye(n - 1) + 1)' with the standard deviation of an arrival "
             "time in s",
         )
-    chosen = usable[:: -(-len(usable) // _MOST_SOUNDS)]
+    return _common_scale(sounds, array, _LEAST_S, _LARGEST_S)
+
+
+def _telling(sounds: Sequence[GivenSound], array: KnownArray) -> list[GivenSound]:
+    """Returns some of the sounds whose delays show their errors."""
+    usable = [s for s in sounds if s.usable and _freedom(s, array) > 0]
+    return usable[:: max(-(-len(usable) // _MOST_SOUNDS), 1)]
+
+
+def _misfit_in_common(sounds: Sequence[GivenSound], array: KnownArray) -> bool:
+    """Returns whether most sounds fit worse than chance explains."""
+    chosen = _telling(sounds, array)
+    freedom = [_freedom(sound, array) for sound in chosen]
+    # A single sound counts little, even if its errors are gross.
+    most = chi2.isf(_LEAST_CHANCE, freedom)
+    misfits = [_chi_square(sound, array, 1.0) for sound in chosen]
+    total = float(np.minimum(misfits, most).sum())
+    return bool(chosen) and bool(chi2.sf(total, sum(freedom)) < _CHANCE)
+
+
+def _common_scale(
+    sounds: Sequence[GivenSound], array: KnownArray, low: float, high: float
+) -> tuple[float, int]:
+    """Estimates the scale of the errors that all sounds have in common.
+
+    With it, half of the sounds fit as well as half of all sounds should. A few sounds
+    with gross errors therefore have little effect. Returns the scale, between ``low``
+    and ``high``, and its degrees of freedom.
+    """
+    chosen = _telling(sounds, array)
     expected = [chi2.median(_freedom(sound, array)) for sound in chosen]
 
     def excess(log_std: float) -> float:
@@ -160,7 +195,7 @@ def common_arrival_std(
         ]
         return float(np.median(ratios)) - 1.0
 
-    log_std = _root(excess, _LEAST_S, _LARGEST_S)
+    log_std = _root(excess, low, high)
     return math.exp(log_std), sum(_freedom(sound, array) for sound in chosen)
 
 
@@ -211,6 +246,8 @@ def _estimate(
     origin: NDArray[np.float64],
     common: float,
     widened: float,
+    *,
+    stated: bool,
 ) -> DelayEstimate:
     if not sound.usable:
         return DelayEstimate(left_out=sound.left_out, reason=_IMPOSSIBLE)
@@ -229,7 +266,10 @@ def _estimate(
     placed = place_source(aligned, array)
     if placed is None:
         return DelayEstimate(left_out=sound.left_out, reason=_UNCERTAIN)
-    return _told(placed, sound, array.shape, origin, misfit, freedom, factor)
+    raised = scale if stated else factor
+    if stated and common > 1.0:
+        misfit = _chi_square(sound, array, 1.0)
+    return _told(placed, sound, array.shape, origin, misfit, freedom, raised)
 
 
 def _told(
@@ -243,7 +283,7 @@ def _told(
 ) -> DelayEstimate:
     fix, systematic = placed.fix, placed.systematic
     others = [] if shape.side is not None else [fix.mirrored(shape)]
-    if fix.twin is not None and fix.range_valid:
+    if fix.twin is not None:
         others.append(_moved(fix, fix.twin))
     ranged = fix.range_valid
     return DelayEstimate(
