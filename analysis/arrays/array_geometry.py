@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, ValidationError, model_validator
 
+from analysis.arrays.array_body import ArrayBody
 from analysis.arrays.array_budget import ArrayBudget, rotations
 from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
@@ -19,7 +20,6 @@ from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Point, Positive
 from systems.sound.acoustics import SOUND_SPEED_M_S, sound_speed
 from systems.sound.array_shape import ArrayShape
-from systems.sound.rigid_sphere import RigidSphere
 
 # Largest distance between two microphones, m. Larger distances mean that the positions
 # are not in meters.
@@ -51,10 +51,6 @@ _TEMPERATURE_C, _SPEED_SHARE = 2.0, 0.01
 # Tolerance for the symmetry and the eigenvalues of a covariance, as a share of its
 # largest variance.
 _ROUNDING = 1e-6
-
-# Largest distance of a microphone from the surface of its body, as a share of the
-# radius.
-_OFF_BODY = 0.1
 
 # Pairs of fields of which a geometry states at most one.
 _ALTERNATIVES = (
@@ -96,13 +92,6 @@ class KnownArray:
         """Standard deviation of positions whose delays are those of free air, m."""
         body = self.shape.body
         return math.hypot(self.budget.position_std, body.bend_std_m if body else 0.0)
-
-
-class ArrayBody(Parameters):
-    """A body that carries the microphones on its surface."""
-
-    sphere_m: float = Field(ge=0.005, le=1.0)
-    """Radius of a rigid sphere, m. Its center is the origin of the positions."""
 
 
 class ArrayGeometry(Parameters):
@@ -189,7 +178,8 @@ class ArrayGeometry(Parameters):
                 f"{_LARGEST_M:g} m apart",
             )
         self._check_budget(shape)
-        self._check_body()
+        if self.body is not None:
+            self.body.check(self.microphones)
         if self.side is not None:
             shape.facing(self.side)
         return self
@@ -215,20 +205,6 @@ class ArrayGeometry(Parameters):
         if covariance is not None:
             _check_covariance(covariance, shape)
 
-    def _check_body(self) -> None:
-        if self.body is None:
-            return
-        radius = self.body.sphere_m
-        off = np.abs(np.linalg.norm(self.microphones, axis=1) - radius)
-        k = int(off.argmax())
-        if off[k] > _OFF_BODY * radius:
-            raise InputError(
-                "body",
-                f"microphone {k + 1} is {1e3 * off[k]:.3g} mm off a sphere of "
-                f"{1e3 * radius:.4g} mm around the origin; give positions from the "
-                "center of the sphere, in m",
-            )
-
     @property
     def columns(self) -> tuple[int, ...]:
         """Columns of the recording to use, one per microphone."""
@@ -251,10 +227,8 @@ class ArrayGeometry(Parameters):
         of_places = self._of_places(shape) + turns @ turns.T
         delay_std, speed_std = self.delay_std_s, self._speed_std()
         if self.body is not None:
-            towards = np.array(self.microphones)
-            towards /= np.linalg.norm(towards, axis=1, keepdims=True)
             band = self.band or (LOWEST_HZ, HIGHEST_FAULTS_HZ)
-            body = RigidSphere(towards, self.body.sphere_m, band, self.c)
+            body = self.body.sphere(self.microphones, band, self.c)
             p = body.scale * np.array(self.microphones)
             shape = replace(ArrayShape.of(p), body=body)
             of_places = body.scale**2 * of_places

@@ -100,12 +100,12 @@ def _deviations(
         found.estimates, azimuth_deg, height_deg, strict=True
     ):
         # Four microphones in space: two places can have the same delays.
-        off = [
+        around = [
             abs((c.bearing_deg - azimuth + 180.0) % 360.0 - 180.0)
             for c in (e, *e.alternatives)
             if c.bearing_deg is not None
         ]
-        if off and min(off) < off[0] - 1e-6:
+        if around and min(around) < around[0] - 1e-6:
             continue
         for value, std, true in (
             (e.bearing_deg, e.bearing_std_deg, azimuth),
