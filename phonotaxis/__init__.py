@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from analysis.runs.columns import columns
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
+    from phonotaxis.arrays import ResolutionResult, array_resolution
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
+    from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
     from phonotaxis.listening import ListenResult, listen
     from phonotaxis.listings import Listing, laws, scenarios
     from phonotaxis.loops import DesignResult, StabilityResult, design, stability
@@ -39,11 +41,13 @@ __all__ = [
     "ArrayGeometry",
     "CalibrationResult",
     "ComparisonResult",
+    "DelayResult",
     "DesignResult",
     "InputError",
     "ListenResult",
     "Listing",
     "LocateResult",
+    "ResolutionResult",
     "Result",
     "RunError",
     "RunResult",
@@ -54,7 +58,9 @@ __all__ = [
     "SweepPlan",
     "SweepResult",
     "__version__",
+    "array_resolution",
     "calibrate",
+    "calibrate_delays",
     "columns",
     "compare",
     "design",
@@ -63,6 +69,7 @@ __all__ = [
     "listen",
     "load_scenario",
     "locate",
+    "locate_delays",
     "main",
     "scenarios",
     "simulate",
@@ -78,11 +85,13 @@ _HOMES = {
     "ArrayGeometry": "analysis.arrays.array_geometry",
     "CalibrationResult": "phonotaxis.recordings",
     "ComparisonResult": "phonotaxis.batches",
+    "DelayResult": "phonotaxis.delays",
     "DesignResult": "phonotaxis.loops",
     "InputError": "systems.framework.input_error",
     "ListenResult": "phonotaxis.listening",
     "Listing": "phonotaxis.listings",
     "LocateResult": "phonotaxis.recordings",
+    "ResolutionResult": "phonotaxis.arrays",
     "Result": "phonotaxis.result",
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
@@ -92,7 +101,9 @@ _HOMES = {
     "StabilityResult": "phonotaxis.loops",
     "SweepPlan": "analysis.batches.plan",
     "SweepResult": "phonotaxis.batches",
+    "array_resolution": "phonotaxis.arrays",
     "calibrate": "phonotaxis.recordings",
+    "calibrate_delays": "phonotaxis.delays",
     "columns": "analysis.runs.columns",
     "compare": "phonotaxis.batches",
     "design": "phonotaxis.loops",
@@ -102,6 +113,7 @@ _HOMES = {
     "load_scenario": "diagrams.scenario.loading",
     "locate": "phonotaxis.recordings",
     "scenarios": "phonotaxis.listings",
+    "locate_delays": "phonotaxis.delays",
     "simulate": "phonotaxis.runs",
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",

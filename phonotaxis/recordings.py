@@ -9,7 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from analysis.arrays.array_geometry import ArrayGeometry, make_geometry
-from analysis.arrays.calibrate import CalibrationRun, calibrate as run_calibration
+from analysis.arrays.calibrate import (
+    CalibrationRun,
+    calibrate as run_calibration,
+    calibrated_geometry,
+)
 from analysis.arrays.calibration_plots import plot_calibration
 from analysis.arrays.calibration_sounds import (
     CalibrationSounds,
@@ -81,7 +85,7 @@ class CalibrationResult(Result):
     @property
     def geometry(self) -> ArrayGeometry:
         """The calibrated array, which ``locate`` and ``listen`` accept."""
-        return ArrayGeometry.model_validate(self.document()["geometry"])
+        return calibrated_geometry(self.run.calibration, self.run.geometry)
 
     def document(self) -> dict[str, Any]:
         """Returns the JSON document of ``phonotaxis calibrate``."""
@@ -153,7 +157,7 @@ def prepare_locate(
 ) -> Prepared[LocateResult]:
     """Prepares the search for sources in a recording; see ``locate``."""
     return Prepared(
-        run=lambda _: _logged(LocateResult(**vars(located(recorded, geometry))))
+        run=lambda _: logged(LocateResult(**vars(located(recorded, geometry))))
     )
 
 
@@ -191,11 +195,11 @@ def prepare_calibration(
 ) -> Prepared[CalibrationResult]:
     """Prepares a calibration; see ``calibrate``."""
     return Prepared(
-        run=lambda _: _logged(CalibrationResult(run_calibration(sounds, geometry)))
+        run=lambda _: logged(CalibrationResult(run_calibration(sounds, geometry)))
     )
 
 
-def _logged(result: AnyResult) -> AnyResult:
+def logged(result: AnyResult) -> AnyResult:
     """Logs the notes of a result as warnings."""
     for note in result.notes:
         logging.getLogger("phonotaxis").warning("%s", note)

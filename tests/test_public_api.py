@@ -120,7 +120,7 @@ def test_tables_lose_no_digit(run: phonotaxis.RunResult, tmp_path: Path):
 def test_every_function_has_a_result_of_one_shape():
     functions = (
         "simulate", "sweep", "compare", "stability", "design", "locate", "listen",
-        "calibrate",
+        "calibrate", "locate_delays", "calibrate_delays", "array_resolution",
     )  # fmt: skip
     for name in functions:
         kind = getattr(

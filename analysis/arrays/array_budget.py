@@ -10,6 +10,19 @@ from numpy.typing import NDArray
 from systems.sound.array_shape import ArrayShape
 
 
+def rotations(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the displacements of (n, d) microphones if the array turns by 1 rad.
+
+    The (n d, r) columns are turns about the axes x, y and z, or about z only in the
+    plane, to first order.
+    """
+    count, dimension = places.shape
+    p = np.pad(places - places.mean(axis=0), ((0, 0), (0, 3 - dimension)))
+    axes = np.eye(3) if dimension == 3 else np.eye(3)[2:]
+    turns = [np.cross(axis, p)[:, :dimension].ravel() for axis in axes]
+    return np.stack(turns, axis=1).reshape(count * dimension, -1)
+
+
 @dataclass(frozen=True)
 class ArrayBudget:
     """Standard deviations of the errors in the description of n microphones.

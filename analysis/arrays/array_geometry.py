@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, ValidationError, model_validator
 
-from analysis.arrays.array_budget import ArrayBudget
+from analysis.arrays.array_body import ArrayBody
+from analysis.arrays.array_budget import ArrayBudget, rotations
 from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
@@ -107,6 +109,12 @@ class KnownArray:
         """Whether the microphones are recorders more than about 11 m apart in air."""
         return self.shape.max_delay(self.c) > _FAR_APART_S
 
+    @property
+    def misplaced_m(self) -> float:
+        """Standard deviation of positions whose delays are those of free air, m."""
+        body = self.shape.body
+        return math.hypot(self.budget.position_std, body.bend_std_m if body else 0.0)
+
 
 class ArrayGeometry(Parameters):
     """Contents of a geometry file.
@@ -136,6 +144,9 @@ class ArrayGeometry(Parameters):
     """Covariance of the microphone coordinates, m^2, instead of ``position_std_m``.
     Give the covariance of one microphone, which then applies to all. Or give the
     covariance of all coordinates in the order of the microphones."""
+    orientation_std_deg: float = Field(default=0.0, ge=0.0, le=90.0)
+    """Standard deviation of the orientation of the whole array about each axis, deg. It
+    adds to the errors of the positions."""
     sound_speed_std: float | None = Field(default=None, ge=0.0, le=400.0)
     """Standard deviation of the speed of sound, m/s. None: the value that follows from
     the standard deviation of the temperature. If the file states nothing about the air,
@@ -155,6 +166,9 @@ class ArrayGeometry(Parameters):
     """Side on which all sources are: ahead of or behind a row, above or below a plane.
     None: both sides are possible, and the mirrored direction is reported as an
     alternative."""
+
+    body: ArrayBody | None = None
+    """Body that carries the microphones. None: free air."""
 
     @model_validator(mode="after")
     def _check(self) -> ArrayGeometry:
@@ -188,6 +202,8 @@ class ArrayGeometry(Parameters):
                 f"{_LARGEST_M:g} m apart",
             )
         self._check_budget(shape)
+        if self.body is not None:
+            self.body.check(self.microphones)
         if self.side is not None:
             shape.facing(self.side)
         return self
@@ -236,11 +252,22 @@ class ArrayGeometry(Parameters):
     def known(self) -> KnownArray:
         """The array with the errors of its description, as the estimators need it."""
         shape = ArrayShape.of(self.microphones)
-        of_places = self._of_places(shape)
+        turns = math.radians(self.orientation_std_deg) * rotations(shape.p_AM)
+        of_places = self._of_places(shape) + turns @ turns.T
+        delay_std, speed_std = self.delay_std_s, self._speed_std()
+        if self.body is not None:
+            band = self.band or (LOWEST_HZ, HIGHEST_FAULTS_HZ)
+            body = self.body.sphere(self.microphones, band, self.c)
+            p = body.scale * np.array(self.microphones)
+            shape = replace(ArrayShape.of(p), body=body)
+            of_places = body.scale**2 * of_places
+            delay_std = math.hypot(delay_std, body.arrival_std_s)
+            # Delays that are too long by a share are those of slower sound.
+            speed_std = math.hypot(speed_std, body.scale_std * self.c)
         return KnownArray(
             shape=shape if self.side is None else shape.facing(self.side),
             c=self.c,
-            budget=ArrayBudget(of_places, self._speed_std(), self.delay_std_s),
+            budget=ArrayBudget(of_places, speed_std, delay_std),
             gain_std_db=self.gain_std_db,
             largest_range_error=self.largest_range_error,
             centroid_m=tuple(np.mean(self.microphones, axis=0).tolist()),

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from analysis.arrays.array_budget import rotations
 from analysis.arrays.array_geometry import ArrayGeometry
 from analysis.arrays.calibration import Calibration, calibrate_array
 from analysis.arrays.calibration_misfit import (
@@ -47,12 +49,16 @@ _REPLACED = frozenset(
         "microphones",
         "position_std_m",
         "position_covariance_m2",
+        "orientation_std_deg",
         "sound_speed",
         "sound_speed_std",
         "temperature_c",
         "temperature_std_c",
     }
 )
+
+# Fields that a file holds if it has no room for the covariance.
+_LOSSY = ("position_std_m", "orientation_std_deg")
 
 # _DIGITS: significant digits to try for a covariance, finest first.
 # _AROUND: characters of YAML that surround each number.
@@ -85,6 +91,7 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
     plausible, or if no recording contains a detectable sound.
     """
     places = np.array(geometry.microphones)
+    require_free_air(geometry)
     for k, listed in enumerate(sounds.sounds):
         if listed.position_m is not None:
             position = np.array(listed.position_m)
@@ -99,9 +106,17 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
     if not fits or gains_nothing(first.calibration) or math.isinf(top_hz):
         return first
     # Better known microphone positions allow higher frequencies, which say more.
-    known = ArrayGeometry.model_validate(calibrated_fields(first.calibration, geometry))
+    known = calibrated_geometry(first.calibration, geometry)
     top_hz = _top_hz(geometry, _shape_std(first))
     return _pass(sounds, geometry, known, top_hz)
+
+
+def require_free_air(geometry: ArrayGeometry) -> None:
+    """Raises ``InputError`` if the array has a body."""
+    if geometry.body is not None:
+        raise InputError(
+            "body", "arrays on a body cannot be calibrated; measure the positions"
+        )
 
 
 def _pass(
@@ -190,6 +205,19 @@ def calibration_run(
     return CalibrationRun(geometry, found, gains, misfit, heard or [], remarks or [])
 
 
+def calibrated_geometry(
+    calibration: Calibration, geometry: ArrayGeometry
+) -> ArrayGeometry:
+    """Makes the geometry of a calibrated array, with the whole covariance."""
+    fields = {
+        **calibrated_fields(calibration, geometry),
+        "position_covariance_m2": _symmetric(calibration.of_places).tolist(),
+    }
+    for lossy in _LOSSY:
+        fields.pop(lossy, None)
+    return ArrayGeometry.model_validate(fields)
+
+
 def calibrated_fields(
     calibration: Calibration, geometry: ArrayGeometry
 ) -> dict[str, Any]:
@@ -197,8 +225,8 @@ def calibrated_fields(
 
     Fields that were not calibrated are copied from the array as stated. If the array is
     too large for a covariance in the file, the file holds one standard deviation per
-    microphone. If the calibrated microphones no longer lie in a plane or line, the
-    field ``side`` is left out.
+    microphone, and that of the orientation of the array. If the calibrated microphones
+    no longer lie in a plane or line, the field ``side`` is left out.
     """
     fields = {
         "microphones": calibration.places.tolist(),
@@ -222,11 +250,23 @@ def _has_side(calibration: Calibration, side: _Side) -> bool:
 
 
 def _uncertainty(calibration: Calibration) -> dict[str, Any]:
-    covariance = calibration.of_places
-    symmetric = (covariance + covariance.T) / 2.0
+    symmetric = _symmetric(calibration.of_places)
     for digits in _DIGITS:
-        if covariance.size * (digits + _AROUND) < LARGEST_BYTES:
+        if symmetric.size * (digits + _AROUND) < LARGEST_BYTES:
             rows = [[float(f"{x:.{digits}g}") for x in row] for row in symmetric]
             return {"position_covariance_m2": rows}
-    variances = np.diag(covariance).reshape(calibration.places.shape)
-    return {"position_std_m": np.sqrt(variances.mean(axis=1)).tolist()}
+    places = calibration.places
+    turns = rotations(places)
+    # Turns of the whole array are not independent errors of its microphones.
+    turned = turns @ np.linalg.pinv(turns, rcond=1e-9)
+    shape = np.eye(len(symmetric)) - turned
+    variances = np.diag(shape @ symmetric @ shape).reshape(places.shape)
+    of_turns = np.trace(turned @ symmetric @ turned) / np.trace(turns @ turns.T)
+    return {
+        "position_std_m": np.sqrt(variances.mean(axis=1)).tolist(),
+        "orientation_std_deg": math.degrees(math.sqrt(of_turns)),
+    }
+
+
+def _symmetric(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    return (covariance + covariance.T) / 2.0

@@ -127,6 +127,7 @@ def calibrate_array(
     half = np.linalg.inv(np.linalg.cholesky(np.eye(z.size) + information)).T
     found, speed, late = unknowns.values(z)
     free = sum(places.shape[1] for sound in sounds if sound.position is None)
+    missing = sum(sound.missing for sound in sounds)
     return Calibration(
         unknowns=unknowns,
         places=found,
@@ -138,7 +139,7 @@ def calibrate_array(
         fits=tuple(fits),
         sounds=tuple(sounds),
         chi_square=_cost(z, fits),
-        freedom=len(sounds) * (len(places) - 1) - free,
+        freedom=len(sounds) * (len(places) - 1) - free - missing,
         settled=settled,
     )
 

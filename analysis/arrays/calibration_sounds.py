@@ -113,6 +113,8 @@ class MeasuredSound:
     """Standard deviation of each coordinate of ``position``, m."""
     name: str = ""
     """Name of the sound in messages."""
+    missing: int = 0
+    """Number of delays that were not measured. Their variances are very large."""
 
 
 def check_sounds(places: NDArray[np.float64], sounds: Sequence[MeasuredSound]) -> None:

@@ -124,7 +124,7 @@ def find_channel_faults(
             measured.levels,
             shape,
             c / sample_rate_hz,
-            position_std_m=array.budget.position_std,
+            position_std_m=array.misplaced_m,
             gain_std_db=array.gain_std_db,
         )
 

@@ -83,7 +83,7 @@ def _on_sphere(
         basis = np.linalg.svd(u[np.newaxis])[2][1:].T
         step = _least_squares(slopes @ basis, tau - slopes @ u)
         u = u + basis @ step
-        u /= np.linalg.norm(u)
+        u /= max(float(np.linalg.norm(u)), 1e-12)
     return u, np.linalg.svd(u[np.newaxis])[2][1:].T
 
 

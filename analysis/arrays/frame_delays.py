@@ -24,6 +24,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.body_delays import free_air_delays
+from analysis.arrays.far_field import locate_far_source
 from systems.hearing.coherent import arrival_delays
 from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import NEAREST_M, SourceFix
@@ -149,8 +151,7 @@ def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
     every = max(1, min(trials // _MOST_TRIALS, len(d) // _LEAST_FRAMES))
     d, levels = d[::every], levels[::every]
     turned = (
-        replace(delays, shape=replace(shape, p_AM=exchanged(shape.p_AM, *pair)))
-        for pair in exchanges
+        replace(delays, shape=_with_exchanged(shape, *pair)) for pair in exchanges
     )
     found = [_fitting(d, levels, other) for other in turned]
     best = max(share for share, _ in found)
@@ -236,6 +237,13 @@ def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
     return rows[order]
 
 
+def _with_exchanged(shape: ArrayShape, i: int, j: int) -> ArrayShape:
+    body = shape.body
+    if body is not None:
+        body = replace(body, towards=exchanged(body.towards, i, j))
+    return replace(shape, p_AM=exchanged(shape.p_AM, i, j), body=body)
+
+
 def _fitting(
     differences: NDArray[np.float64], levels: NDArray[np.float64], delays: FrameDelays
 ) -> tuple[float, float]:
@@ -246,13 +254,18 @@ def _fitting(
     """
     shape, tolerance = delays.shape, delays.tolerance_m
     gain_std_db = delays.gain_std_db
+    covariance = (0.5 * tolerance) ** 2 * (np.eye(shape.count - 1) + 1.0)
+    if shape.body is not None:
+        free = [free_air_delays(d, covariance, shape, 1.0) for d in differences]
+        differences = np.reshape(free, differences.shape)
     if shape.kind == "plane" and shape.dimension == 2:
         # The source may be above or below the plane.
         shape = ArrayShape.of(np.column_stack((shape.p_AM, np.zeros(shape.count))))
-    covariance = (0.5 * tolerance) ** 2 * (np.eye(shape.count - 1) + 1.0)
     errors = []
     for d, level in zip(differences, levels, strict=True):
-        fix = locate_source(d, covariance, shape, 1.0)
+        # On a body, only the delays of distant sources are known.
+        locate = locate_source if shape.body is None else locate_far_source
+        fix = locate(d, covariance, shape, 1.0)
         off = arrival_delays(fix, shape, 1.0) - d
         fits = np.abs(off).max() < tolerance
         if fits and not levels_contradict(level, fix, shape, gain_std_db):

@@ -122,6 +122,7 @@ def _order(delays: FrameDelays) -> list[ChannelFault]:
         return []
     text = (
         f"channels: {100 * share:.0f} % of the delays fit no place outside the array; "
-        "check the microphones' positions (in m), their order and the speed of sound"
+        "check the microphones' positions (in m), their order and the speed of sound, "
+        "and state the 'body' if the microphones are on a sphere"
     )
     return [ChannelFault("geometry", (), text)]

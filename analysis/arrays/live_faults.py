@@ -180,7 +180,8 @@ class LiveFaults:
         self._lags.append((t_s, lags))
         if len(self._lags) >= 2 * _MOST_LAGS:
             self._lags = self._lags[::2]
-        if self._count % 4:
+        # On a body, the delays of a source that moves fit no wave front in free air.
+        if self._count % 4 or self._known.shape.body is not None:
             return
         chosen = self._lags[:: -(-len(self._lags) // _MOST_LAGS)]
         times = np.array([t for t, _ in chosen])

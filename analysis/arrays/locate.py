@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.arrays.array_geometry import ArrayGeometry, KnownArray
+from analysis.arrays.body_delays import in_free_air
 from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.far_field import locate_far_source
@@ -248,15 +249,16 @@ def _clearest(heard: list[_Heard]) -> _Heard:
 
 
 def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _Heard:
+    shape = array.shape
     search = RecordingSearch(
         recording,
-        array.shape,
+        shape,
         array.c,
         snapshots,
-        slack_s=_SLACK * array.budget.position_std / array.c,
-        has_place=lambda delays: has_place(delays, array),
+        slack_s=_SLACK * array.misplaced_m / array.c,
+        has_place=lambda delays: has_place(in_free_air(delays, shape, array.c), array),
     )
-    sightings = list(search.sightings())
+    sightings = [in_free_air(s, shape, array.c) for s in search.sightings()]
     placed = ((s.t_s, place_source(s, array)) for s in sightings)
     found = [
         SourceEstimate.of(t_s, at, array.centroid_m)

@@ -124,7 +124,9 @@ def prepared_recording(
     if processed is not None:
         raise InputError("recording", f"{where}: {_not_of_a_microphone(*processed)}")
     change = drift = None
-    delays_tell = trusts_positions and not known.far_apart
+    # On a body, the delays of a source that moves fit no wave front in free air.
+    in_air = shape.body is None and not known.far_apart
+    delays_tell = trusts_positions and in_air
     if delays_tell and np.isfinite(channels).all():
         change = _change(channels, geometry, float(rate), where)
         if change is None:

@@ -102,8 +102,10 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
         tau, own + _budget(u, 0.0, array), shape, c, inverse_range_std=bent
     )
     near, allowed = _near(tau, own, u, array)
+    # The delays at a body are known for distant sources only.
     if (
-        near.range_valid
+        shape.body is None
+        and near.range_valid
         and near.range >= NEAREST_M
         and near.chi_square < chi_square_limit(shape.freedom)
         and near.chi_square < far.chi_square - _CURVED

@@ -138,6 +138,9 @@ def centroid_delays(
     Distant sources have the inverse range 0, and their places are unit vectors.
     """
     far = -places @ shape.p_AM.T
+    if shape.body is not None:
+        units = places / np.maximum(np.linalg.norm(places, axis=1), 1e-12)[:, None]
+        return far / c + shape.body.later(units)
     ranges = np.linalg.norm(places, axis=1, keepdims=True)
     to_microphones = np.linalg.norm(places[:, np.newaxis] - shape.p_AM, axis=2)
     near = inverse_range[:, np.newaxis] > 0.0

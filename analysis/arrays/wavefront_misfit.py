@@ -113,7 +113,8 @@ def late_channel(
         tuple(int(k) for k in blamed),
         f"channel {names}: off by {late_us:.0f} us at all times, or its microphone "
         f"by {1e-3 * late_us * array.c:.0f} mm; sample all channels at once, and check "
-        "their order and the positions (in m)",
+        "their order and the positions (in m); a body that carries the microphones "
+        "has the same effect",
     )
 
 

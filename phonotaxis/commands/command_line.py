@@ -18,6 +18,7 @@ from typing import Any, NoReturn
 
 from phonotaxis.commands import (
     accuracy,
+    array,
     calibrate,
     compare,
     completion,
@@ -53,6 +54,7 @@ COMMANDS: dict[str, Command] = {
         locate.COMMAND,
         listen.COMMAND,
         calibrate.COMMAND,
+        array.COMMAND,
         accuracy.COMMAND,
         compare.COMMAND,
         stability.COMMAND,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.input_error import InputError
+from systems.sound.rigid_sphere import RigidSphere
 
 # Smallest distance between two microphones, m.
 _LEAST_DISTANCE_M = 1e-3
@@ -62,6 +63,9 @@ class ArrayShape:
     """Largest distance between two microphones, m."""
     side: Literal["ahead", "behind", "above", "below"] | None = None
     """Side on which all sources are known to be; None: both sides are possible."""
+    body: RigidSphere | None = None
+    """Rigid sphere that carries the microphones; None: free air. If there is a sphere,
+    the positions are those in free air whose delays fit best."""
 
     @classmethod
     def of(cls, positions: ArrayLike, flat_m: float | None = None) -> ArrayShape:

@@ -1,0 +1,64 @@
+"""``phonotaxis array``: what a microphone array can resolve."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from phonotaxis.commands.arguments import completed_by, say, take_json
+from phonotaxis.commands.command import Command, Take
+
+if TYPE_CHECKING:
+    from phonotaxis.arrays import ResolutionResult
+    from phonotaxis.result import Prepared
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    geometry = parser.add_argument(
+        "geometry", metavar="FILE.yaml", help="positions of the microphones"
+    )
+    completed_by(geometry, "file")
+    parser.add_argument(
+        "--snr-db",
+        metavar="DB",
+        type=float,
+        default=20.0,
+        help="level of the sound over the noise (default: 20)",
+    )
+    parser.add_argument(
+        "--seconds",
+        metavar="S",
+        type=float,
+        default=0.5,
+        help="duration of the sound (default: 0.5)",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="directory for array.json and array.png"
+    )
+    take_json(parser)
+
+
+def _prepare(options: Namespace, take: Take) -> Prepared[ResolutionResult]:
+    from analysis.arrays.array_geometry import load_geometry
+
+    geometry = load_geometry(options.geometry)
+    if options.out is not None:
+        take(options.out)
+    say(f"predicting the errors of {options.geometry}")
+
+    from phonotaxis.arrays import prepare_resolution
+
+    return prepare_resolution(geometry, options.snr_db, options.seconds)
+
+
+COMMAND = Command(
+    "array",
+    "predict what an array of microphones can resolve",
+    _add_arguments,
+    _prepare,
+    where="\nresults in {out}",
+    examples=(
+        "array array.yaml",
+        "array array.yaml --snr-db 10 --seconds 2 --out results/array",
+    ),
+)
