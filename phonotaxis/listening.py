@@ -195,8 +195,9 @@ def open_sound(
         size = known.known.shape.aperture_m
         raise InputError(
             "geometry",
-            f"has recorders {size:.3g} m apart, too far for a live direction; locate "
-            "recordings with 'phonotaxis locate'",
+            f"has microphones {size:.3g} m apart, too far for a live direction; give "
+            "positions in m (divide those in cm by 100), or locate recordings with "
+            "'phonotaxis locate'",
         )
     every = max(known.columns) + 1
     if sound is None:

@@ -29,6 +29,9 @@ _LEAST_FRAMES = 16
 # Up to this factor, they mean wrong positions or wrongly ordered channels.
 _OTHER_UNITS = 3.5
 
+# Distance from the middle up to which a source is amid the array, in apertures.
+_AMID = 0.1
+
 # Largest plausible distance of a source straight above the array, m.
 _FARTHEST_M = 20.0
 
@@ -72,7 +75,8 @@ def _speed_fault(delays: FrameDelays, c: float) -> ChannelFault | None:
 
 def _near(delays: FrameDelays) -> ChannelFault | None:
     distance = near_range_m(delays)
-    if distance is None:
+    # All delays of a source amid the array are short, as with positions in other units.
+    if distance is None or distance < _AMID * delays.shape.aperture_m:
         return None
     return ChannelFault(
         "near",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import math
+import re
 
 import numpy as np
 import pytest
 
+import phonotaxis
 from analysis.arrays.array_geometry import ArrayGeometry
 from analysis.arrays.live_hearing import HeardStream, LiveHearing, listen_to
 from analysis.arrays.sound_stream import SoundBlock, SoundStream, StreamBrokenError
@@ -111,14 +114,21 @@ def test_a_stream_that_ends_early_is_looked_at_as_well(seconds):
     assert heard.status.startswith("stopped: channels 3 and 4: their samples are equal")
 
 
-def test_positions_in_centimeters_end_it():
+@pytest.mark.parametrize(("factor", "told"), [(100.0, False), (50.0, True)])
+def test_positions_in_other_units_are_named(factor, told):
+    """In cm, the microphones are farther apart than `listen` accepts."""
     geometry = ArrayGeometry(
-        microphones=tuple((100.0 * x, 100.0 * y) for x, y in SQUARE),
+        microphones=tuple((factor * x, factor * y) for x, y in SQUARE),
         sound_speed=SOUND_SPEED,
     )
+    remedy = r"give positions in m \(divide those in cm by 100"
+    if not told:
+        with pytest.raises(InputError, match=remedy):
+            phonotaxis.listen(io.BytesIO(), geometry, sample_rate_hz=RATE, channels=4)
+        return
     heard, _, _ = hear(FRIENDS, geometry)
     assert heard.failed
-    assert "give positions in m (divide those in cm by 100" in heard.status
+    assert re.search(remedy, heard.status)
 
 
 def test_lost_samples_leave_out_their_channel():
@@ -226,8 +236,12 @@ def test_a_stream_that_breaks_off_says_so():
     [
         (1, RATE, "is mono, but the array needs 4"),
         (3, RATE, "has 3 channels, but the array needs 4"),
-        (6, RATE, "name the channels to use in the geometry file"),
-        (4, 4_000, "has a sample rate of 4000 Hz; record at 8000 to 192000 Hz"),
+        (
+            6,
+            RATE,
+            "name the columns of its microphones.*'channels' of the geometry file",
+        ),
+        (4, 4_000, "has a sample rate of 4000 Hz; record at 8000 to 500000 Hz"),
     ],
 )
 def test_streams_of_another_array_are_refused_and_closed(channels, rate, complaint):
