@@ -7,7 +7,7 @@ and ``cases()``, which lists them.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -37,21 +37,28 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Iterator[Table]:
     """Yields the counts of all kinds, and then each case that was wrong."""
-    rows: list[list[object]] = []
-    wrong: list[list[object]] = []
-    sums = np.zeros(3, dtype=int)
+    wrong: list[Sequence[object]] = []
+    heads = ("kind", "cases", "right", "wrong at a confidence above 0.5")
+    yield Table("cases of hearing", heads, _counts(options, wrong))
+    yield Table("wrong answers", ("kind", "case", "said"), wrong)
+
+
+def _counts(
+    options: argparse.Namespace, wrong: list[Sequence[object]]
+) -> Iterator[Sequence[object]]:
+    """Yields the counts of each kind, and of all; lists the wrong cases in ``wrong``."""
+    total = np.zeros(3, dtype=int)
     for name, (title, cases) in kinds().items():
         if options.kind and options.kind not in name:
             continue
         chosen = [c for c in cases if not options.case or options.case in c.name]
         outcomes = [(case, case.judge()) for case in chosen]
         counts = [
-            sum(getattr(outcome, name) for _, outcome in outcomes)
-            for name in ("right", "false_claim")
+            len(outcomes),
+            sum(outcome.right for _, outcome in outcomes),
+            sum(outcome.false_claim for _, outcome in outcomes),
         ]
-        sums += np.array([len(outcomes), *counts])
-        rows.append([title, len(outcomes), *counts])
+        total += counts
         wrong += [[title, c.name, o.said] for c, o in outcomes if not o.right]
-    total = ["all", *sums.tolist()]
-    yield Table("Cases", ("kind", "cases", "right", "false claims"), [*rows, total])
-    yield Table("Wrong answers", ("kind", "case", "said"), wrong)
+        yield [title, *counts]
+    yield ["all", *total.tolist()]
