@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> Iterator[Table]:
 def _counts(
     options: argparse.Namespace, wrong: list[Sequence[object]]
 ) -> Iterator[Sequence[object]]:
-    """Yields the counts of each kind, and of all; lists the wrong cases in ``wrong``."""
+    """Yields the counts of each kind and of all, and adds wrong cases to ``wrong``."""
     total = np.zeros(3, dtype=int)
     for name, (title, cases) in kinds().items():
         if options.kind and options.kind not in name:
