@@ -122,15 +122,21 @@ def plot_resolution(found: ArrayResolution) -> Figure:
                 rows = _at_height(found, height)
                 stds = [getattr(e, f"{name}_std_deg") for e in rows]
                 values = [np.nan if std is None else std for std in stds]
-                if rows:
+                if np.isfinite(values).any():
                     shown = f"elevation {height:g} deg" if len(found.angles) > 1 else ""
                     axes.plot(BEARINGS_DEG, values, color=color, label=shown)
-            if len(found.angles) > 1:
-                axes.legend(fontsize=8)
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0)
         draw_grid(axes)
     every[-1].set_xlabel("bearing (deg)")
+    if len(found.angles) > 1:
+        figure.legend(
+            *every[0].get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=len(ELEVATIONS_DEG),
+            fontsize=8,
+            frameon=False,
+        )
     figure.suptitle("What the array can resolve (far source, no echoes)", fontsize=11)
     return figure
 
