@@ -57,8 +57,8 @@ def test_bad_input_is_one_line_and_status_2(capsys, words, field, hint):
     assert hint in printed.err
 
 
-def test_its_old_name_still_does_with_a_notice(capsys):
+def test_its_old_name_is_a_synonym(capsys):
     assert phonotaxis.main(["localization", "--trials", "0"]) == 2
     said = capsys.readouterr().err.splitlines()
-    assert said[0] == "phonotaxis: the command localization is now called accuracy"
+    assert said[0] == "phonotaxis: localization means the command accuracy"
     assert "trials" in said[1]

@@ -124,7 +124,6 @@ def test_layouts_that_set_what_the_comparison_sets_are_refused(tmp_path):
         ({"scenarios": ["default", "default"]}, "scenario"),
         ({"runs": 0}, "runs"),
         ({"seed": "one"}, "seed"),
-        ({"laws": "active,active"}, "grid.law"),
         ({"settings": ["law=none"]}, "grid.law"),
         ({"settings": ["duration_s"]}, "duration_s"),
         ({"grid": ["hearing=audio"]}, "hearing"),

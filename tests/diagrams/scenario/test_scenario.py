@@ -12,6 +12,7 @@ from diagrams.scenario.bodies import robot_rectangle
 from diagrams.scenario.participants import StartParameters
 from diagrams.scenario.scenario import Scenario
 from systems.base.robot import RobotParameters
+from systems.framework.input_error import InputError
 from systems.world.geometry import rectangle_corners
 
 
@@ -107,5 +108,5 @@ def test_all_that_sounds_is_in_the_room(data, message):
 def test_seed_fits_the_generators():
     assert Scenario(seed=2**63 - 1).seed == 2**63 - 1
     for seed in (-1, 2**63):
-        with pytest.raises(ValidationError, match="seed"):
+        with pytest.raises(InputError, match="seed"):
             Scenario(seed=seed)
