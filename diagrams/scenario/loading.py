@@ -77,6 +77,9 @@ def changed_scenario(
         settings: Fields to change, as for ``load_scenario``.
         fields: Further fields to change. They override ``settings``.
 
+    Returns:
+        The changed scenario.
+
     Raises:
         InputError: See ``load_scenario``.
     """

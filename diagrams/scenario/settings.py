@@ -45,6 +45,9 @@ def all_settings(
         overrides: Settings in one of the forms of ``plain_settings``.
         fields: Values by dotted path.
 
+    Returns:
+        Plain values by dotted path.
+
     Raises:
         InputError: See ``plain_settings``.
     """

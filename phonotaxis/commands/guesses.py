@@ -90,6 +90,9 @@ def no_option(
         unknown: Unknown words of the command line, at least one.
         words: All words of the command line.
         options: Names of the options of each command, without dashes.
+
+    Returns:
+        The message.
     """
     text = f"unrecognized arguments: {' '.join(unknown)}"
     own = options[command]

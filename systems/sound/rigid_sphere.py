@@ -33,6 +33,7 @@ _TOPS = (1.0, 0.5, 0.25)
 # at most 1.6 times the step.
 _STEP, _LEAST_STEPS = 0.25, 60
 
+
 @dataclass(frozen=True)
 class RigidSphere:
     """A rigid sphere with n microphones on its surface, in a band of frequencies."""
