@@ -8,8 +8,9 @@ from collections.abc import Mapping
 REFERENCES: Mapping[str, str] = {
     "Anderson et al. 2018": "P. Anderson et al., On Evaluation of Embodied Navigation "
     "Agents, arXiv 1807.06757, 2018",
-    "Astrom and Murray": "K. J. Astrom, R. M. Murray, Feedback Systems: An Introduction "
-    "for Scientists and Engineers, 2nd edition, Princeton University Press, 2021",
+    "Astrom and Murray": "K. J. Astrom, R. M. Murray, Feedback Systems: An "
+    "Introduction for Scientists and Engineers, 2nd edition, Princeton University "
+    "Press, 2021",
     "Balasubramanian et al. 2012": "S. Balasubramanian, A. Melendez-Calderon, E. "
     "Burdet, A Robust and Sensitive Metric for Quantifying Movement Smoothness, IEEE "
     "Trans. Biomedical Engineering 59 (8), 2012",
