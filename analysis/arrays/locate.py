@@ -169,8 +169,10 @@ def hear(recorded: RecordedSamples, geometry: ArrayGeometry) -> HeardRecording:
         if not estimates:
             faults += unclear_tone(search, known)
         return HeardRecording(recording, search, sightings, estimates, faults, used)
-    # A faulty channel has another spectrum than the others without any reflector.
-    reflector = None if faults else near_reflector(recording)
+    # Faulty channels, and channels in the shadow of a body, have other spectra than the
+    # others without any reflector.
+    unlike = bool(faults) or known.shape.body is not None
+    reflector = None if unlike else near_reflector(recording)
     if reflector is not None:
         faults.append(reflector)
     if not any(f.kind in _EXPLAINS_LATENESS for f in faults):
