@@ -44,13 +44,15 @@ def geometry_faults(
     ``c`` is the stated speed of sound, m/s. ``farther`` returns the delays from
     searches over longer delays.
     """
-    speed = _speed_fault(delays, c)
+    # On a body, only the delays of distant sources are known.
+    in_air = delays.shape.body is None
+    speed = _speed_fault(delays, c) if in_air else None
     if speed is not None:
         return [speed]
     order = _order(delays)
     if any(fault.kind == "swapped" for fault in order):
         return order
-    near = _near(delays)
+    near = _near(delays) if in_air else None
     if near is not None:
         return [near]
     scale = delay_scale(delays)
