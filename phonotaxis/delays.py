@@ -75,7 +75,7 @@ def locate_delays(
     If no place explains the delays within their stated errors, the errors are raised
     until one does. A warning of the logger ``phonotaxis``, and ``notes`` of the result,
     then say so. They also list delays that are impossible because sound cannot travel
-    so long. Impossible delays have no effect on the result.
+    so long. The result does not depend on impossible delays.
 
     Args:
         delays: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1 after microphone 0,

@@ -1,4 +1,4 @@
-"""Locates continuous tones, and tells which tones are ambiguous."""
+"""Locates continuous tones, and names the tones whose direction is ambiguous."""
 
 from __future__ import annotations
 

@@ -151,8 +151,8 @@ class LiveHearing:
                     self.heard.identities |= {track.identity for track in step.tracks}
                     power = max(_QUIET, float(np.mean(powers)))
                     doubted = step.unfit or step.t_s < self._doubted_until_s
-                    step = replace(step, unfit=doubted)  # noqa: PLW2901
-                    yield HeardStep(step, 10.0 * math.log10(power))
+                    told = replace(step, unfit=doubted)
+                    yield HeardStep(told, 10.0 * math.log10(power))
                     powers.clear()
             for fault in looks.finish():
                 self._mend(fault, looks)

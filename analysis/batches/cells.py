@@ -247,8 +247,8 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     The reasons for the other failures are:
 
     - ``jam``: The robot never reached the goal. It got stuck, or the time ran out.
-    - ``held off``: The robot reached the goal, but got stuck outside of it later. The
-      law had pushed the robot away from the source itself.
+    - ``held off``: The robot reached the goal, left it again, and got stuck outside.
+      The law had pushed the robot away from the source.
     - ``swings``: The robot reached the goal but did not come to rest there.
     - ``lost``: The robot lost the source.
     - ``astray``: The robot did not follow the moving source for long enough.

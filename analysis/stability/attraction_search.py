@@ -70,9 +70,9 @@ _CUTS: tuple[BreakPoint, ...] = ("sensor", "actuator")
 _ROUNDS = 4
 #: The follow distance is rounded up to a multiple of this step, m.
 _STEP_M = 0.05
-#: Simulation of the overshoot. ``_APPROACH_M``: initial distance of the source, m. It
-#: is so long that P reaches top speed. ``_STAND_OFF_M``: follow distance, m. It is so
-#: long that P stops in front of the source.
+#: Simulation of the overshoot. ``_APPROACH_M``: initial distance of the source, m. On
+#: this distance, P reaches its top speed. ``_STAND_OFF_M``: follow distance, m. With
+#: this distance, P stops in front of the source.
 _APPROACH_M, _STAND_OFF_M = 8.0, 3.0
 
 
@@ -322,8 +322,8 @@ def with_follow_distance(scenario: Scenario, requirements: Requirements) -> Scen
     """Returns a copy with a follow distance and gains of the law that fit each other.
 
     The follow distance is at least the current one, and leaves room for the overshoot.
-    For a law whose tuning ``sets_follow_distance``, the follow distance is also so long
-    that the law shifts P at rest by at most ``rest_offset_m``. The gains are those of
+    If the tuning of a law ``sets_follow_distance``, the law also shifts P at rest by at
+    most ``rest_offset_m`` at this distance. The gains are those of
     ``fitting_gains``. For a law that is not in ``DESIGNED_LAWS``, the gains stay.
     """
     law = scenario.only.law

@@ -77,7 +77,7 @@ def streamed(
     geometry: ArrayGeometry,
     tell: Callable[[float, float], None],
 ) -> str:
-    """Listens to (n, k) samples, and tells the time and bearing of each track, rad.
+    """Listens to (n, k) samples; reports time, s, and bearing, rad, of each track.
 
     Returns what stopped the stream, or an empty text.
     """

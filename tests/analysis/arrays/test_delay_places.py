@@ -242,7 +242,7 @@ def test_an_array_is_calibrated_by_sounds_in_unknown_directions():
         )
         stds = np.array([e.bearing_std_deg for e in found.estimates])
         assert np.mean(np.abs(off) < 2.0 * stds) > 0.9
-        # The orientation of the array is the one thing that no sound tells.
+        # Sounds at unknown places do not show the orientation of the array.
         errors[name] = np.std(off - off.mean())
     assert errors["after"] < 0.5 * errors["before"]
 
