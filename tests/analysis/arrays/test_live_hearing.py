@@ -11,7 +11,14 @@ import pytest
 
 import phonotaxis
 from analysis.arrays.array_geometry import ArrayGeometry
-from analysis.arrays.live_hearing import HeardStream, LiveHearing, listen_to
+from analysis.arrays.channel_fault import ChannelFault
+from analysis.arrays.live_faults import LiveFaults
+from analysis.arrays.live_hearing import (
+    HeardStream,
+    LiveHearing,
+    listen_to,
+    track_document,
+)
 from analysis.arrays.sound_stream import SoundBlock, SoundStream, StreamBrokenError
 from systems.framework.input_error import InputError
 from tests.analysis.arrays.plane_waves import RATE, SOUND_SPEED, SQUARE, plane_waves
@@ -258,3 +265,18 @@ def test_silence_has_no_sources_and_no_faults():
     heard, told, named = hear(np.hstack((silence, FRIENDS)))
     assert (named, heard.failed, heard.identities) == ([], False, {1})
     assert 10.0 < told[0][0] <= 10.5 + 1e-6
+
+
+@pytest.mark.parametrize(("kind", "doubted"), [("geometry", True), ("moves", False)])
+def test_a_fault_that_stays_limits_confidences(monkeypatch, kind, doubted):
+    faults = [ChannelFault(kind, (), "a message")]
+
+    def look(*_):
+        while faults:
+            yield faults.pop()
+
+    monkeypatch.setattr(LiveFaults, "look", look)
+    stream = SoundStream(4, RATE, blocks_of(FRIENDS), lambda: None)
+    steps = list(LiveHearing(stream, GEOMETRY).steps())
+    told = [line["confidence"] for step in steps for line in track_document(step)]
+    assert max(told) <= 0.5 if doubted else max(told) > 0.9
