@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
 
 from systems.framework.input_error import InputError
 from systems.sound.sound_file import MOST_SAMPLES, ReadSound, read_recording
@@ -159,7 +158,7 @@ def _part(
     padded = samples[:, np.clip(wanted, 0, samples.shape[1] - 1)]
     steps = np.arange(-_HALF, _HALF + 1)
     kernel = np.sinc(steps + shift) * np.kaiser(steps.size, _BETA)
-    return np.asarray(fftconvolve(padded, kernel[np.newaxis], "valid", axes=1))
+    return np.array([np.convolve(channel, kernel, "valid") for channel in padded])
 
 
 def _order_remark(paths: Sequence[str | Path]) -> str:

@@ -20,7 +20,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import eval_legendre, spherical_jn, spherical_yn
 
 # Angles of the table of delays.
 _ANGLE = np.linspace(0.0, math.pi, 181)
@@ -129,6 +128,9 @@ def surface_pressure(
     microphone and source, rad. The phase of the (f, m) result is the angular frequency
     times the arrival time.
     """
+    # Geometries with a sphere are read, and refused, before scipy is loaded.
+    from scipy.special import eval_legendre, spherical_jn, spherical_yn
+
     n = np.arange(math.ceil(1.3 * float(ka.max()) + 12.0))[:, np.newaxis]
     slope = np.empty((len(n), len(ka)), dtype=np.complex128)
     slope.real = spherical_jn(n, ka, derivative=True)
