@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from analysis.arrays.source_estimate import SourceEstimate
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.batches.plan import SweepPlan
+    from analysis.loops.diagram_linearization import linearize
+    from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
     from diagrams.scenario.loading import library_scenarios, load_scenario
@@ -44,6 +46,7 @@ __all__ = [
     "DelayResult",
     "DesignResult",
     "InputError",
+    "LinearizedDiagram",
     "ListenResult",
     "Listing",
     "LocateResult",
@@ -66,6 +69,7 @@ __all__ = [
     "design",
     "laws",
     "library_scenarios",
+    "linearize",
     "listen",
     "load_scenario",
     "locate",
@@ -88,6 +92,7 @@ _HOMES = {
     "DelayResult": "phonotaxis.delays",
     "DesignResult": "phonotaxis.loops",
     "InputError": "systems.framework.input_error",
+    "LinearizedDiagram": "analysis.loops.linearized_diagram",
     "ListenResult": "phonotaxis.listening",
     "Listing": "phonotaxis.listings",
     "LocateResult": "phonotaxis.recordings",
@@ -109,6 +114,7 @@ _HOMES = {
     "design": "phonotaxis.loops",
     "laws": "phonotaxis.listings",
     "library_scenarios": "diagrams.scenario.loading",
+    "linearize": "analysis.loops.diagram_linearization",
     "listen": "phonotaxis.listening",
     "load_scenario": "diagrams.scenario.loading",
     "locate": "phonotaxis.recordings",
