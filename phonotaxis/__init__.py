@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.batches.plan import SweepPlan
     from analysis.loops.diagram_linearization import linearize
+    from analysis.loops.given_loops import disk_margin, loop_at, margins
     from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
@@ -67,6 +68,7 @@ __all__ = [
     "columns",
     "compare",
     "design",
+    "disk_margin",
     "laws",
     "library_scenarios",
     "linearize",
@@ -74,7 +76,9 @@ __all__ = [
     "load_scenario",
     "locate",
     "locate_delays",
+    "loop_at",
     "main",
+    "margins",
     "scenarios",
     "simulate",
     "stability",
@@ -112,7 +116,10 @@ _HOMES = {
     "columns": "analysis.runs.columns",
     "compare": "phonotaxis.batches",
     "design": "phonotaxis.loops",
+    "disk_margin": "analysis.loops.given_loops",
     "laws": "phonotaxis.listings",
+    "loop_at": "analysis.loops.given_loops",
+    "margins": "analysis.loops.given_loops",
     "library_scenarios": "diagrams.scenario.loading",
     "linearize": "analysis.loops.diagram_linearization",
     "listen": "phonotaxis.listening",

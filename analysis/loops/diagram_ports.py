@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import PortDataType
+from pydrake.systems.framework import InputPortIndex, PortDataType
 
 from systems.framework.input_error import InputError
 
@@ -109,6 +109,46 @@ def find_signals(system: Any, wanted: Sequence[Any] | None, kind: Kind) -> list[
         prefix = key.removesuffix(port.get_name())
         found.append(_signal(prefix, where, port, kind))
     return found
+
+
+def find_source(system: Any, wanted: Any) -> Any:
+    """Finds the output port that feeds an input port inside a diagram.
+
+    Args:
+        system: Drake diagram.
+        wanted: Name ``block.port`` of the input port, or the port.
+
+    Returns:
+        The output port.
+
+    Raises:
+        InputError: The input port is not known, or no output port feeds it.
+    """
+    (signal,) = find_signals(system, [wanted], "input")
+    parents = [system]
+    for index in signal.where:
+        parents.append(parents[-1].GetSystems()[index])
+    block, port = parents.pop(), signal.index
+    # An input port of an inner diagram passes its value on to ports inside it.
+    while parents:
+        parent = parents.pop()
+        for (to_block, to_port), (of_block, of_port) in parent.connection_map().items():
+            if to_block is block and int(to_port) == port:
+                return of_block.get_output_port(int(of_port))
+        exported = [
+            k
+            for k in range(parent.num_input_ports())
+            for to_block, to_port in parent.GetInputPortLocators(InputPortIndex(k))
+            if to_block is block and int(to_port) == port
+        ]
+        if not exported:
+            break
+        block, port = parent, exported[0]
+    raise InputError(
+        "port",
+        f"{signal.name!r} is not fed by an output port of the diagram; choose an input "
+        "port inside a loop",
+    )
 
 
 def _list(known: dict[str, Any]) -> str:
