@@ -25,6 +25,7 @@ def linearize(
     inputs: Sequence[Any] | None = None,
     outputs: Sequence[Any] | None = None,
     period_s: float | None = None,
+    read_after: bool = False,
     differences_only: bool = False,
 ) -> LinearizedDiagram:
     """Linearizes any Drake system: continuous, sampled at several rates, or both.
@@ -32,8 +33,8 @@ def linearize(
     The state is the one just before the updates at the time of the context. With
     discrete states, the model maps this state, and inputs that are held over one
     period, to the state one period later. The period is the least common multiple of
-    all update periods. Outputs are read before the updates. Without discrete states,
-    the model is the derivative of the time derivatives.
+    all update periods. Without discrete states, the model is the derivative of the time
+    derivatives.
 
     Args:
         diagram: A Drake ``Diagram`` or ``LeafSystem``. It is not changed.
@@ -47,6 +48,8 @@ def linearize(
             ports of the diagram.
         period_s: Period of the whole diagram, s. It is needed only for blocks whose
             period Drake does not tell, because they have several.
+        read_after: Whether to read the outputs just after the updates that begin the
+            period, instead of just before.
         differences_only: Whether to use differences even if all blocks convert to
             AutoDiffXd.
 
@@ -82,5 +85,7 @@ def linearize(
             "state period_s, after which all updates repeat",
         )
     period = period_s or (common_period(timings) if timings else None)
-    mapped = DiagramMap(diagram, context, sources, sinks, timings, period)
+    mapped = DiagramMap(
+        diagram, context, sources, sinks, timings, period, read_after=read_after
+    )
     return mapped.linearized(differences_only=differences_only)

@@ -45,7 +45,10 @@ class DiagramMap:
         sinks: Sequence[Signal],
         timings: Sequence[Timing],
         period_s: float | None,
+        *,
+        read_after: bool = False,
     ) -> None:
+        self.read_after = read_after
         self.diagram, self.context, self.period_s = diagram, context, period_s
         self.sources, self.sinks = sources, sinks
         self.state = get_state(context)
@@ -115,8 +118,8 @@ class DiagramMap:
             start += len(value)
         context.SetTime(self.start_s)
         set_state(context, point[:count])
-        outputs = [signal.eval(system, context) for signal in self.sinks]
         if self.period_s is None:
+            outputs = [signal.eval(system, context) for signal in self.sinks]
             after = system.EvalTimeDerivatives(context).CopyToVector()
             return np.concatenate([after, *outputs])
         simulator.get_mutable_integrator().set_maximum_step_size(
@@ -125,6 +128,9 @@ class DiagramMap:
         quiet = InitializeParams()
         quiet.suppress_initialization_events = True
         simulator.Initialize(quiet)
+        if self.read_after:
+            simulator.AdvancePendingEvents()
+        outputs = [signal.eval(system, context) for signal in self.sinks]
         simulator.AdvanceTo(self.end_s)
         return np.concatenate([get_state(context), *outputs])
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.loops.diagram_linearization import linearize
 from analysis.loops.diagram_ports import find_source
 from analysis.loops.linear_models import LinearModel
@@ -12,6 +15,11 @@ from analysis.loops.linearized_diagram import LinearizedDiagram
 from analysis.loops.loop_margins import LoopMargins, loop_margins
 from analysis.loops.multiloop_disk import MultiloopDiskMargin, multiloop_disk_margin
 from systems.framework.input_error import InputError
+
+#: Largest relative difference between equal matrices.
+_SAME = 1e-6
+#: Condition number above which a loop has no unique signals.
+_SINGULAR = 1e12
 
 
 def loop_at(diagram: Any, context: Any, port: Any) -> LinearModel:
@@ -21,6 +29,10 @@ def loop_at(diagram: Any, context: Any, port: Any) -> LinearModel:
     the signal that would return to the port, with its sign changed. The model is
     therefore the loop transfer function L of a loop with negative feedback, as the
     margins expect it.
+
+    In a sampled loop, the signal at the port must be constant between the periods of
+    the model, because L describes one value per period. The function checks this: it
+    closes L again, and compares the result with the linear model of the closed diagram.
 
     Args:
         diagram: A Drake ``Diagram``. It is not changed.
@@ -33,11 +45,38 @@ def loop_at(diagram: Any, context: Any, port: Any) -> LinearModel:
     Raises:
         InputError: The port is not known, is not a vector, or is not connected to an
             output port of the diagram.
+        InputError: The signal at the port changes within the period of the diagram.
     """
     source = find_source(diagram, port)
-    found = linearize(diagram, context, inputs=[port], outputs=[source])
-    model = found.model
-    return replace(model, name=f"loop at {port}", C=-model.C, D=-model.D)
+    closed = linearize(diagram, context, inputs=(), outputs=()).model
+    # A continuous block receives the signal as it is after the updates, and a sampled
+    # block as it is before.
+    for read_after in (False, True):
+        model = linearize(
+            diagram, context, inputs=[port], outputs=[source], read_after=read_after
+        ).model
+        if _closes_to(model, closed):
+            name = port if isinstance(port, str) else port.get_name()
+            return replace(model, name=f"loop at {name}", C=-model.C, D=-model.D)
+    raise InputError(
+        "port",
+        f"the signal at {port!r} changes within {model.period_s:g} s, the period of "
+        "the diagram, so that no single transfer function describes it; choose an "
+        "input that a sampled block with this period feeds",
+    )
+
+
+def _closes_to(model: LinearModel, closed: LinearModel) -> bool:
+    """Whether the model of the open loop becomes that of the closed loop."""
+    back = np.eye(len(model.D)) - model.D
+    if np.linalg.cond(back) > _SINGULAR:
+        return False
+    A = model.A + model.B @ np.linalg.solve(back, model.C)
+    return bool(np.abs(A - closed.A).max(initial=0.0) <= _SAME * _size(closed.A))
+
+
+def _size(matrix: NDArray[np.float64]) -> float:
+    return max(1.0, float(np.abs(matrix).max(initial=0.0)))
 
 
 def margins(loop: Any) -> LoopMargins:

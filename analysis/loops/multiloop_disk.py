@@ -103,7 +103,7 @@ def multiloop_disk_margin(model: LinearModel, skew: float = 0.0) -> MultiloopDis
         )
         if -found.fun > best:
             best, where = float(-found.fun), float(found.x)
-    highest = sensitivity.D.astype(complex) + offset
+    highest: NDArray[np.complex128] = (sensitivity.D + offset).astype(complex)
     # In continuous time, S is (I + D)^-1 at infinite frequency.
     if not T and (last := mu_upper(highest)) > best:
         best, where = last, math.inf
@@ -118,7 +118,7 @@ def multiloop_disk_margin(model: LinearModel, skew: float = 0.0) -> MultiloopDis
 
 def _sensitivity(model: LinearModel) -> LinearModel:
     """S = (I + L)^-1. If the closed loop is stable, all poles of S decay."""
-    inverse = np.linalg.inv(np.eye(len(model.D)) + model.D)
+    inverse = np.asarray(np.linalg.inv(np.eye(len(model.D)) + model.D), dtype=float)
     return replace(
         model,
         A=model.A - model.B @ inverse @ model.C,

@@ -21,6 +21,7 @@ PAGES = (
     "extending.md",
     "stability_report.md",
     "your_recording.md",
+    "your_diagram.md",
 )
 #: What only works in a clone, and was done before.
 IN_A_CLONE = ("make ", ". .venv", "git ", "pip ", "cd ")

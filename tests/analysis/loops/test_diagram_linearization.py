@@ -8,21 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydrake.systems import primitives
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import (
-    Adder,
-    DiscreteTimeDelay,
-    FirstOrderLowPassFilter,
-    Gain,
-    LinearSystem,
-    Saturation,
-    ZeroOrderHold,
-)
 from scipy.linalg import expm
 
 from analysis.loops.diagram_linearization import linearize
 from systems.framework.input_error import InputError
+
+#: Drake's types of arguments are narrower than what it accepts.
+blocks: Any = primitives
 
 #: Sums of powers of 2, so that Drake's times of updates have no rounding errors. Drake
 #: makes updates whose times differ by rounding one after the other.
@@ -51,17 +46,17 @@ class Loop:
             period = float(rng.choice(PERIODS))
             offset = float(TICK * rng.integers(0, 4))
             if kind == "flow":
-                system = LinearSystem(A, B, C, D)
+                system = blocks.LinearSystem(A, B, C, D)
             elif kind == "sampled":
                 A /= max(1.0, np.abs(np.linalg.eigvals(A)).max())
-                system, offset = LinearSystem(A, B, C, D, period), 0.0
+                system, offset = blocks.LinearSystem(A, B, C, D, period), 0.0
             else:
-                system = ZeroOrderHold(period, 1, offset)
+                system = blocks.ZeroOrderHold(period, 1, offset)
                 A, B = np.zeros((1, 1)), np.ones((1, 1))
                 C, D = np.ones((1, 1)), np.zeros((1, 1))
             systems.append(builder.AddNamedSystem(f"block_{number}", system))
             self.blocks.append((kind, (A, B, C, D, period, offset)))
-        adder = builder.AddNamedSystem("sum", Adder(2, 1))
+        adder = builder.AddNamedSystem("sum", blocks.Adder(2, 1))
         builder.Connect(systems[-1].get_output_port(), adder.get_input_port(0))
         builder.ExportInput(adder.get_input_port(1), "u")
         builder.Connect(adder.get_output_port(), systems[0].get_input_port())
@@ -135,7 +130,7 @@ def test_random_diagrams_with_several_rates_and_offsets(seed):
 
 
 def test_delay_by_state_is_a_chain():
-    delay = DiscreteTimeDelay(0.1, 3, 1)
+    delay = blocks.DiscreteTimeDelay(0.1, 3, 1)
     context = delay.CreateDefaultContext()
     delay.get_input_port().FixValue(context, [0.0])
     found = linearize(delay, context)
@@ -146,21 +141,20 @@ def test_delay_by_state_is_a_chain():
 
 def test_continuous_diagrams_have_the_model_that_drake_finds():
     from pydrake.examples import PendulumPlant
-    from pydrake.systems.primitives import Linearize
 
     pendulum = PendulumPlant()
-    context = pendulum.CreateDefaultContext()
+    context: Any = pendulum.CreateDefaultContext()
     context.SetContinuousState([0.4, 0.0])
     torque = 0.5 * 9.81 * 1.0 * math.sin(0.4)
     pendulum.get_input_port().FixValue(context, [torque])
     found = linearize(pendulum, context, outputs=["state"])
-    drake = Linearize(pendulum, context)
+    drake: Any = blocks.Linearize(pendulum, context)
     assert found.model.period_s is None
     assert pytest.approx(drake.A(), abs=1e-12) == found.model.A
     assert pytest.approx(drake.B(), abs=1e-12) == found.model.B
     sampled = found.sampled(0.1)
     assert pytest.approx(expm(0.1 * drake.A()), abs=1e-12) == sampled.A
-    delay = DiscreteTimeDelay(0.1, 1, 1)
+    delay = blocks.DiscreteTimeDelay(0.1, 1, 1)
     context = delay.CreateDefaultContext()
     delay.get_input_port().FixValue(context, [0.0])
     with pytest.raises(InputError, match="sampled already"):
@@ -177,16 +171,16 @@ class Nonlinear(LeafSystem):
         self.set_name("pendulum")
         self.DeclareVectorInputPort("push", 1)
         self.DeclareContinuousState(2)
-        self.DeclareDiscreteState([0.0])
+        self.DeclareDiscreteState(1)
         self.DeclarePeriodicDiscreteUpdateEvent(period_s, 0.0, self._update)
         self.DeclareVectorOutputPort("angle", 1, self._angle)
 
     def _angle(self, context: Any, output: Any) -> None:
-        output.SetAtIndex(0, context.get_continuous_state_vector()[0])
+        output.SetAtIndex(0, context.get_continuous_state_vector().GetAtIndex(0))
 
     def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
         angle, speed = context.get_continuous_state_vector().CopyToVector()
-        torque = context.get_discrete_state_vector()[0]
+        torque = context.get_discrete_state_vector().GetAtIndex(0)
         push = self.get_input_port().Eval(context)[0]
         derivatives.get_mutable_vector().SetFromVector(
             [speed, -math.sin(angle) - 0.1 * speed + torque + push]
@@ -199,7 +193,7 @@ class Nonlinear(LeafSystem):
 
 def test_blocks_without_automatic_derivatives_are_stepped():
     pendulum = Nonlinear(0.05)
-    context = pendulum.CreateDefaultContext()
+    context: Any = pendulum.CreateDefaultContext()
     context.SetContinuousState([0.3, -0.2])
     pendulum.get_input_port().FixValue(context, [0.1])
     found = linearize(pendulum, context)
@@ -212,7 +206,7 @@ def test_blocks_without_automatic_derivatives_are_stepped():
     step = 1e-5
 
     def after(moved: np.ndarray) -> np.ndarray:
-        own = pendulum.CreateDefaultContext()
+        own: Any = pendulum.CreateDefaultContext()
         own.SetContinuousState(moved[:2])
         own.SetDiscreteState(moved[2:])
         pendulum.get_input_port().FixValue(own, [0.1])
@@ -234,8 +228,8 @@ def test_blocks_without_automatic_derivatives_are_stepped():
 
 def test_a_loop_is_opened_at_an_input_inside():
     builder = DiagramBuilder()
-    lag = builder.AddNamedSystem("lag", FirstOrderLowPassFilter(2.0))
-    gain = builder.AddNamedSystem("gain", Gain(-4.0, 1))
+    lag = builder.AddNamedSystem("lag", blocks.FirstOrderLowPassFilter(2.0))
+    gain = builder.AddNamedSystem("gain", blocks.Gain(-4.0, 1))
     builder.Connect(lag.get_output_port(), gain.get_input_port())
     builder.Connect(gain.get_output_port(), lag.get_input_port())
     diagram = builder.Build()
@@ -254,13 +248,13 @@ def test_a_loop_is_opened_at_an_input_inside():
 
 def test_a_switch_is_named_with_block_and_port():
     builder = DiagramBuilder()
-    lag = builder.AddNamedSystem("lag", FirstOrderLowPassFilter(2.0))
-    limit = builder.AddNamedSystem("limit", Saturation([-1.0], [1.0]))
+    lag = builder.AddNamedSystem("lag", blocks.FirstOrderLowPassFilter(2.0))
+    limit = builder.AddNamedSystem("limit", blocks.Saturation([-1.0], [1.0]))
     builder.Connect(lag.get_output_port(), limit.get_input_port())
     builder.ExportInput(lag.get_input_port(), "u")
     builder.ExportOutput(limit.get_output_port(), "y")
     diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
+    context: Any = diagram.CreateDefaultContext()
     diagram.get_input_port().FixValue(context, [1.0])
     context.SetContinuousState([1.0])
     found = linearize(diagram, context)
@@ -271,18 +265,18 @@ def test_a_switch_is_named_with_block_and_port():
 
 
 def test_refusals_name_the_remedy():
-    lag = FirstOrderLowPassFilter(2.0)
+    lag = blocks.FirstOrderLowPassFilter(2.0)
     lag.set_name("lag")
     with pytest.raises(InputError, match="has no value; fix it"):
         linearize(lag)
-    hold = ZeroOrderHold(0.1, 1, 5.0)
+    hold = blocks.ZeroOrderHold(0.1, 1, 5.0)
     context = hold.CreateDefaultContext()
     hold.get_input_port().FixValue(context, [0.0])
     with pytest.raises(InputError, match="set the time to 5 s"):
         linearize(hold, context)
     builder = DiagramBuilder()
     for period in (0.1, 0.1 + 1e-9 / 7.0):
-        block = builder.AddSystem(ZeroOrderHold(period, 1))
+        block = builder.AddSystem(blocks.ZeroOrderHold(period, 1))
         builder.ExportInput(block.get_input_port())
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()

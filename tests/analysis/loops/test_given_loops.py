@@ -8,7 +8,12 @@ import control
 import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import FirstOrderLowPassFilter, Gain, Integrator
+from pydrake.systems.primitives import (
+    FirstOrderLowPassFilter,
+    Gain,
+    Integrator,
+    ZeroOrderHold,
+)
 
 import phonotaxis
 from systems.framework.input_error import InputError
@@ -71,6 +76,43 @@ def test_a_diagram_is_opened_at_a_port(inner, port):
         assert loop.response([w])[0, 0, 0] == pytest.approx(complex(expected(1j * w)))
     found, same = phonotaxis.margins(loop), phonotaxis.margins(expected)
     assert found.phase_margin_deg == pytest.approx(same.phase_margin_deg)
+
+
+def sampled_servo(late: bool):
+    """An integrator, a hold of 20 ms, a gain, and on request a hold of 10 ms."""
+    builder = DiagramBuilder()
+    integrator = builder.AddNamedSystem("integrator", Integrator(1))
+    hold = builder.AddNamedSystem("hold", ZeroOrderHold(0.02, 1))
+    gain = builder.AddNamedSystem("gain", Gain(-4.0, 1))
+    builder.Connect(integrator.get_output_port(), hold.get_input_port())
+    builder.Connect(hold.get_output_port(), gain.get_input_port())
+    last = gain
+    if late:
+        last = builder.AddNamedSystem("late", ZeroOrderHold(0.01, 1))
+        builder.Connect(gain.get_output_port(), last.get_input_port())
+    builder.Connect(last.get_output_port(), integrator.get_input_port())
+    return builder.Build()
+
+
+def test_a_sampled_loop_has_no_delay_of_its_own():
+    diagram = sampled_servo(late=False)
+    # The hold passes the position on at once, so that L = 4 * 0.02 / (z - 1). At the
+    # input of the hold, the position is read before the update, to the same effect.
+    for port in ("integrator.u0", "hold.u"):
+        loop = phonotaxis.loop_at(diagram, None, port)
+        z = np.exp(1j * 3.0 * 0.02)
+        assert loop.response([3.0])[0, 0, 0] == pytest.approx(0.08 / (z - 1.0))
+
+
+def test_a_signal_that_changes_within_the_period_is_no_cut():
+    diagram = sampled_servo(late=True)
+    with pytest.raises(InputError, match=r"changes within 0\.02 s"):
+        phonotaxis.loop_at(diagram, None, "integrator.u0")
+    # At the hold, there is one value per period. The other hold delays by 10 ms.
+    loop = phonotaxis.loop_at(diagram, None, "hold.u")
+    z = np.exp(1j * 3.0 * 0.02)
+    expected = 4.0 * (0.01 + 0.01 / z) / (z - 1.0)
+    assert loop.response([3.0])[0, 0, 0] == pytest.approx(expected)
 
 
 def test_refusals_name_the_remedy():
