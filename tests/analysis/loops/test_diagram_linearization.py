@@ -181,7 +181,7 @@ class Nonlinear(LeafSystem):
     def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
         angle, speed = context.get_continuous_state_vector().CopyToVector()
         torque = context.get_discrete_state_vector().GetAtIndex(0)
-        push = self.get_input_port().Eval(context)[0]
+        push = self.EvalVectorInput(context, 0).GetAtIndex(0)
         derivatives.get_mutable_vector().SetFromVector(
             [speed, -math.sin(angle) - 0.1 * speed + torque + push]
         )
