@@ -16,7 +16,9 @@ ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = Path(sys.executable).with_name("phonotaxis")
 
 
-def python(*words: str, path: list[str], folder: Path) -> subprocess.CompletedProcess:
+def python(
+    *words: str, path: list[str], folder: Path
+) -> subprocess.CompletedProcess[str]:
     """Runs Python in a folder, with modules from the given places first."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path)}
     return subprocess.run(
