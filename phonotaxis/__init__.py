@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from phonotaxis.name_clashes import explain_hidden_modules, refuse_clashes
+
 if TYPE_CHECKING:
     from analysis.arrays.array_geometry import ArrayGeometry
     from analysis.arrays.source_estimate import SourceEstimate
@@ -131,6 +133,9 @@ _HOMES = {
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",
 }
+
+refuse_clashes()
+explain_hidden_modules()
 
 
 def __getattr__(name: str) -> Any:

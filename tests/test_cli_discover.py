@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
@@ -90,6 +91,20 @@ def test_examples_of_the_help_are_commands():
         for example in command.examples:
             words = example.partition(" > ")[0].replace("'", "").split()
             assert make_parser().parse_args(words).command == command.name
+
+
+def test_init_copies_the_template_once(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = call(capsys, "init", "mine", "--json")
+    template = Path(phonotaxis.__file__).parent / "template"
+    assert status == 0
+    for file in json.loads(out)["files"]:
+        original = template / Path(file).relative_to("mine")
+        assert Path(file).read_text() == original.read_text()
+    assert len(json.loads(out)["files"]) == 8
+    status, _, complaint = call(capsys, "init", "mine")
+    assert status == 2
+    assert "mine cannot be written (File exists); name a new directory" in complaint
 
 
 def test_version(capsys):

@@ -30,6 +30,8 @@ def call(capsys, *words: str) -> tuple[int, str, str]:
         ("movie", "phonotaxis simulate --movie FILE.mp4"),
         ("init", "phonotaxis scenarios default --copy my_scenario.yaml"),
         ("new", "phonotaxis scenarios default --copy my_scenario.yaml"),
+        ("init", "phonotaxis init my_robot"),
+        ("init my_scenario.yaml", "scenarios default --copy my_scenario.yaml"),
         ("validate", "phonotaxis scenarios"),
         ("check", "phonotaxis scenarios"),
         ("docs", "phonotaxis COMMAND --help"),

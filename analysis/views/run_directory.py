@@ -110,7 +110,7 @@ def _page(
         ("Blocks", "diagram{}.svg", "Blocks and their connections", {"": "", **whose}),
     ):
         shown = [
-            Picture(file.format(ending), f"{text}{who}.")
+            Picture(file.format(ending), f"{text}{who}.", tall=title == "Over time")
             for ending, who in owners.items()
             if there(file.format(ending))
         ]
@@ -187,5 +187,5 @@ def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[Content]:
         ]
         for metric in found
     ]
-    text = "docs/metrics.md defines each metric."
+    text = "`phonotaxis columns --metrics` describes each metric."
     return [text, Table(["", *(result.several or [""])], rows)]

@@ -367,8 +367,9 @@ def is_interrupt(error: BaseException) -> bool:
 def why(error: BaseException) -> str:
     """Returns the kind, text and line of an error in a user's code."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = Path(__file__).resolve().parents[1]
-    own = [f for f in frames if ours not in Path(f.filename).resolve().parents]
+    home = Path(__file__).resolve().parents[2]
+    ours = {home / name for name in OURS}
+    own = [f for f in frames if ours.isdisjoint(Path(f.filename).resolve().parents)]
     own = [f for f in own if "importlib" not in f.filename]
     at = f" in line {own[-1].lineno} of {Path(own[-1].filename).name}" if own else ""
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

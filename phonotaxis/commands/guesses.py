@@ -9,6 +9,10 @@ _IN_RESULTS = (
     "every result directory holds its pictures and pages; 'phonotaxis results' lists "
     "these directories"
 )
+_NEW = (
+    "use 'phonotaxis init my_robot' for a project, or 'phonotaxis scenarios default "
+    "--copy my_scenario.yaml' for a scenario"
+)
 _CHECKED = "each command checks its input before it runs; see 'phonotaxis scenarios'"
 
 #: What to do instead of a command that does not exist. A text names the line to type.
@@ -19,9 +23,8 @@ _NO_COMMANDS = {
     "replay": f"{_IN_RESULTS}; open replay.html in a browser",
     "movie": "use 'phonotaxis simulate --movie FILE.mp4'",
     "report": f"{_IN_RESULTS}; open report.html in a browser",
-    "init": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
-    "new": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
-    "create": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
+    "new": _NEW,
+    "create": _NEW,
     "validate": _CHECKED,
     "check": _CHECKED,
     "docs": "'phonotaxis COMMAND --help' describes a command; the folder docs has more",

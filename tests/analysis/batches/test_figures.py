@@ -53,6 +53,8 @@ def test_rates_over_a_drawn_number_have_four_bins_and_wilson_intervals():
         cells = [PLAN.cells()[cell]["law"] == law for cell in table["cell"]]
         own = table[cells].sort_values(SPEED)
         assert len(x) == 4
+        left, right = axes.get_xlim()
+        assert left < x.min() < x.max() < right < left + 0.5
         for k, part in enumerate(np.array_split(np.arange(len(own)), 4)):
             group = own.iloc[part]
             hits = int((group["cause"] == "collision").sum())
