@@ -141,7 +141,7 @@ def radial_law(scenario: Scenario) -> RadialLaw:
     return _radial_law(
         key.only.law,
         str(loaded_digests(key)),
-        key.follower.laws.model_dump_json(),
+        f"{key.follower.laws.model_dump_json()} {key.only.own_gains}",
         (sensor.minimum_range_m, sensor.maximum_range_m),
         key.only.robot.top_speed_m_s,
         _Scenario(key),

@@ -15,7 +15,7 @@ import inspect
 import signal
 import sys
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
@@ -323,15 +323,37 @@ def asked_for(maker: type, parts: Mapping[str, Any]) -> dict[str, Any]:
     """
     asked: set[str] = set()
     any_keyword = False
+    for construct in constructors(maker):
+        signature = inspect.signature(construct).parameters.values()
+        asked.update(own.name for own in signature)
+        any_keyword = _takes_any(construct)
+    return {key: parts[key] for key in parts if any_keyword or key in asked}
+
+
+def constructors(maker: type) -> Iterator[Callable[..., Any]]:
+    """Yields the functions whose arguments the constructor of a class accepts.
+
+    The first one is that of the class itself. While they have ``**kwargs``, those of
+    the base classes follow.
+
+    Args:
+        maker: The class. For a scalar-templated class of Drake, the function is
+            ``_construct``.
+
+    Yields:
+        Functions with ``self`` as their first argument.
+    """
     for each in maker.__mro__:
         construct = vars(each).get("_construct") or vars(each).get("__init__")
         if inspect.isfunction(construct):
-            signature = inspect.signature(construct).parameters.values()
-            asked.update(own.name for own in signature)
-            any_keyword = any(own.kind is own.VAR_KEYWORD for own in signature)
-            if not any_keyword:
+            yield construct
+            if not _takes_any(construct):
                 break
-    return {key: parts[key] for key in parts if any_keyword or key in asked}
+
+
+def _takes_any(function: Callable[..., Any]) -> bool:
+    parameters = inspect.signature(function).parameters.values()
+    return any(each.kind is each.VAR_KEYWORD for each in parameters)
 
 
 def _is_users(module: ModuleType, file: str) -> bool:

@@ -55,6 +55,9 @@ from systems.safety.parameters import GuardParameters
 from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 
+#: Value of an argument of a user's own law or block.
+OwnGain = Annotated[float, Field(ge=-1e12, le=1e12)]
+
 #: Law of a robot that states none.
 DEFAULT_LAW = "active"
 
@@ -123,6 +126,9 @@ class Robot(Parameters):
     """Names of a user's own blocks, as ``package.module:Name`` or
     ``path/to/file.py:Name``. Each block replaces the robot's block with the same part
     (role). A block with a new part is added."""
+    own_gains: dict[str, OwnGain] = Field(default={})
+    """Gains of a user's own law and blocks, by name. A gain is an argument with a number
+    as its default: ``law(c, s, push_n=14.0)`` has the gain ``push_n``."""
     loudspeaker: SoundParameters | None = None
     """Sound that the robot itself plays at the origin of B, so that other robots can
     follow the robot. Its fields and defaults are those of ``sound``."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from diagrams.scenario.own_code import import_own
+from diagrams.scenario.own_gains import check_own_gains
 from diagrams.scenario.participants import HasMicrophones
 from diagrams.scenario.shorthand import field_in
 from systems.framework.input_error import InputError
@@ -47,5 +48,6 @@ def check_files(scenario: Scenario) -> None:
             check(import_own, own.law, field_in("robots", name, "law"))
         for block in own.blocks:
             check(import_own, block, field_in("robots", name, "blocks"))
+        check(check_own_gains, own, field_in("robots", name, ""))
     if faults:
         raise InputError.joined(faults)
