@@ -28,7 +28,6 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
         A function with the same arguments. It returns a finite force, N, as a float or
         AutoDiffXd, or raises an InputError.
     """
-
     named = keyword_only(law)
 
     @functools.wraps(law)

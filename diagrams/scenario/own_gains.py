@@ -7,9 +7,10 @@ draws can therefore vary them, like any field.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from diagrams.scenario.fields.field_list import Field
 from diagrams.scenario.own_code import constructors, import_own
 from diagrams.scenario.participants import Robot
 from diagrams.scenario.suggestions import did_you_mean
@@ -49,11 +50,11 @@ def default_gains(own: Callable[..., Any]) -> dict[str, float]:
         if inspect.isclass(own)
         else _parameters(own)[2:]
     )
-    return {
-        each.name: each.default
-        for each in reversed(parameters)  # a class overrides its bases
-        if _is_gain(each) and not (inspect.isclass(own) and each.name in PASSED)
-    }
+    gains: dict[str, float] = {}
+    for each in parameters:
+        if _is_gain(each) and not (inspect.isclass(own) and each.name in PASSED):
+            gains.setdefault(each.name, each.default)  # a class overrides its bases
+    return gains
 
 
 def set_gains(own: Callable[..., Any], values: Mapping[str, float]) -> dict[str, float]:
@@ -125,24 +126,47 @@ def check_own_gains(robot: Robot, prefix: str = "") -> None:
     Raises:
         InputError: A law or block has no such gain, or cannot be imported.
     """
-    own = dict(_own_code(robot)) if robot.own_gains else {}
+    own: dict[str, Any] = {}
+    if robot.own_gains:
+        own = {name: import_own(name, field) for name, field in robot.own_code.items()}
     known = {gain for each in own.values() for gain in default_gains(each)}
     for name in robot.own_gains:
         if own and name not in known:
             whose = " or ".join(map(repr, own))
-            has = f"use {', '.join(sorted(known))}" if known else "it has none"
             raise InputError(
                 f"{prefix}own_gains.{name}",
-                f"is not a gain of {whose}; {has}, or give it an argument with a "
-                f"number as default, {name}=1.0{did_you_mean(name, known)}",
+                f"is not a gain of {whose}{did_you_mean(name, known)}; use "
+                f"{', '.join(sorted(known))}"
+                if known
+                else f"{whose} has no gains; give it an argument with a number as "
+                f"default, {name}=1.0",
             )
 
 
-def _own_code(robot: Robot) -> Iterator[tuple[str, Any]]:
-    if ":" in robot.law:
-        yield robot.law, import_own(robot.law, "law")
-    for block in robot.blocks:
-        yield block, import_own(block, "blocks")
+def gain_fields(law: str) -> list[Field]:
+    """Describes the gains of a user's own law, as ``phonotaxis fields`` lists them.
+
+    Args:
+        law: Name of the law.
+
+    Returns:
+        One field per gain.
+
+    Raises:
+        InputError: The law cannot be imported.
+    """
+    return [
+        Field(
+            path=f"own_gains.{name}",
+            kind="number",
+            unit="",
+            default=default,
+            range="",
+            meaning=f"Argument `{name}` of {law}.",
+            robots=("follower",),
+        )
+        for name, default in default_gains(import_own(law, "law")).items()
+    ]
 
 
 def _has_signature(function: Any) -> bool:

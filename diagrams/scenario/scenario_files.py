@@ -44,10 +44,8 @@ def check_files(scenario: Scenario) -> None:
 
             field = field_in("robots", name, "microphones.ego_noise_file")
             check(read_noise, ears.ego_noise_file, len(own.robot.microphones_m), field)
-        if ":" in own.law:
-            check(import_own, own.law, field_in("robots", name, "law"))
-        for block in own.blocks:
-            check(import_own, block, field_in("robots", name, "blocks"))
+        for code, field in own.own_code.items():
+            check(import_own, code, field_in("robots", name, field))
         check(check_own_gains, own, field_in("robots", name, ""))
     if faults:
         raise InputError.joined(faults)
