@@ -15,10 +15,10 @@ _LONGEST_VALUE = 200
 def outside_values(own: Any) -> dict[str, Any]:
     """Returns the variables outside of a function that the function uses, by name."""
     if inspect.isclass(own):
-        functions = filter(inspect.isfunction, vars(own).values())
-        return {
-            name: v for each in functions for name, v in outside_values(each).items()
-        }
+        found: dict[str, Any] = {}
+        for each in filter(inspect.isfunction, vars(own).values()):
+            found |= outside_values(each)
+        return found
     try:
         used = inspect.getclosurevars(own)
     except (TypeError, ValueError):

@@ -63,8 +63,7 @@ def require_file(name: str, field: str, purpose: str) -> None:
 def source_in_memory(name: str) -> str:
     """Returns the source of an object that exists only in this process.
 
-    The text begins with comments, which state the values that the object uses. It is
-    empty if this process has no object with this name.
+    See ``described``. The text is empty if this process has no object with this name.
     """
     return _SOURCES.get(name.partition(":")[0], "")
 
@@ -102,9 +101,7 @@ def _is_importable(name: str, file: str) -> bool:
     spec = None
     with suppress(ImportError, ValueError):
         spec = PathFinder.find_spec(name, getattr(above, "__path__", None))
-    return (
-        spec is not None and spec.origin is not None and Path(spec.origin) == Path(file)
-    )
+    return spec is not None and Path(spec.origin or "") == Path(file)
 
 
 def _name_in_memory(own: Any) -> str:
@@ -129,9 +126,7 @@ def _kept(own: Any) -> tuple[Any, str]:
         kept = own if inspect.isclass(own) else cloudpickle.loads(text)
     except Exception:  # noqa: BLE001  # an object that cannot be pickled
         text, kept = f"object {next(_COUNT)}".encode(), own
-    used = (
-        module for module in map(_module_of, outside_values(own).values()) if module
-    )
+    used = filter(None, map(_module_of, outside_values(own).values()))
     files = {file for module in used for file in present_files(module)}
     return kept, hashlib.sha256(text + repr(sorted(files)).encode()).hexdigest()
 
