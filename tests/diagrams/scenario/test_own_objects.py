@@ -166,9 +166,7 @@ def test_cells_of_a_notebook_run():
 
 
 def test_an_object_that_is_no_function_is_not_compiled():
-    force = make_controller(
-        load_scenario("default", law=Callables())
-    ).step.numbers.force
+    controller = make_controller(load_scenario("default", law=Callables()))
     with pytest.raises(InputError, match=r"engine: .* run with engine drake"):
         LoopPart().name(controller.step.numbers.force)
 
@@ -219,7 +217,7 @@ def test_gains_are_fields(own):
     [
         (
             {"own_gains.pushn": 2.0},
-            r"own_gains\.pushn: .*own_objects:soft.* \(did .*'push_n'\?\); use push_n, r",
+            r"own_gains\.pushn: .*own_objects:soft.* \(did .*'push_n'\?\); use push_n",
         ),
         ({"own_gains.push_n": "a"}, r"own_gains\.push_n: is 'a'; .* valid number"),
         ({"laws.soft.push_n": 2.0}, r"laws\.soft: .* write gains .* as own_gains"),
