@@ -19,7 +19,7 @@ from pydrake.autodiffutils import AutoDiffXd
 
 from diagrams import Scenario
 from diagrams.building.laws import make_controller
-from diagrams.scenario.own_code import loaded_digests
+from diagrams.scenario.own_versions import loaded_digests
 from systems.framework.input_error import InputError
 
 #: Step between the distances of ``forces_n``, m. For the default laws, linear

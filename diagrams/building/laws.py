@@ -10,7 +10,8 @@ from pydrake.systems.framework import LeafSystem
 from diagrams.building.own_laws import checked_law, try_law
 from diagrams.building.robots.routed_robot import make_trajectory_controller
 from diagrams.building.robots.searching_robot import search_controller
-from diagrams.scenario.own_code import asked_for, import_own, made
+from diagrams.scenario.own_classes import asked_for, made
+from diagrams.scenario.own_code import import_own
 from diagrams.scenario.own_gains import check_own_gains, law_arguments, set_gains
 from diagrams.scenario.participants import (
     Follower,

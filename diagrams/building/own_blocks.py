@@ -6,7 +6,8 @@ import inspect
 from collections.abc import Mapping
 from typing import Any
 
-from diagrams.scenario.own_code import import_own, made
+from diagrams.scenario.own_classes import made
+from diagrams.scenario.own_code import import_own
 from diagrams.scenario.own_gains import check_own_gains, set_gains
 from diagrams.scenario.participants import Robot
 from systems.framework.block import Block

@@ -11,12 +11,11 @@ import ast
 import hashlib
 import importlib
 import importlib.util
-import inspect
 import re
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import ModuleType
@@ -25,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
-    from diagrams.scenario.scenario import Scenario
+    pass
 
 #: Names of objects that exist only in one process.
 _IN_MEMORY = re.compile(r"memory_[0-9a-f]{12}:")
@@ -35,7 +34,7 @@ OURS = ("analysis", "diagrams", "phonotaxis", "systems")
 
 #: Loaded modules of the user, with the contents of their files, by name of the module.
 _LOADED: dict[str, tuple[ModuleType, bytes]] = {}
-#: Whether loaded modules remain in use after a change, see ``code_of_sweep``.
+#: Whether loaded modules remain in use after a change, see ``pinned_code``.
 _KEEPS = False
 
 
@@ -158,59 +157,21 @@ def _forget(changed: Sequence[ModuleType]) -> None:
     importlib.invalidate_caches()
 
 
-def loaded_digests(scenario: Scenario) -> dict[str, str]:
-    """Returns digests of a user's own laws and blocks, to identify their versions.
-
-    Args:
-        scenario: Any scenario. The function ignores laws and blocks of the package.
-
-    Returns:
-        SHA-256 of each file of the user that the robots use, by absolute path. If a
-        file has changed since Python loaded it, the digest is that of the loaded
-        version.
-
-    Raises:
-        InputError: A law or block cannot be imported, see ``import_own``.
-    """
-    digests: dict[str, str] = {}
-    for robot in scenario.robots.values():
-        for name, field in robot.own_code.items():
-            import_own(name, field)
-            digests |= digests_of(_module_of(name.rpartition(":")[0]))
-    return digests
-
-
 @contextmanager
-def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[None]:
-    """Ensures that a scenario runs with the user's code from the start of a sweep.
-
-    A sweep is a series of runs. Within the context, a changed file is not loaded again
-    if all loaded code is from the start of the sweep.
+def pinned_code(wanted: Mapping[str, str]) -> Iterator[None]:
+    """Keeps loaded modules in use after a change, if they have the wanted versions.
 
     Args:
-        scenario: The scenario to run.
-        wanted: SHA-256 of each file at the start of the sweep, by absolute path.
+        wanted: SHA-256 of files, by absolute path. Without files, nothing is kept.
 
     Yields:
         Nothing.
-
-    Raises:
-        InputError: A user's file has changed, and this process has not loaded the
-            version from the start of the sweep.
     """
     global _KEEPS  # noqa: PLW0603
     loaded = {_file_of(module): _digest(text) for module, text in _LOADED.values()}
     kept = [wanted.get(file, digest) == digest for file, digest in loaded.items()]
     _KEEPS = bool(wanted) and all(kept)
     try:
-        own_law = any(":" in robot.law for robot in scenario.robots.values())
-        for file, digest in loaded_digests(scenario).items():
-            if wanted.get(file, digest) != digest:
-                raise InputError(
-                    "law" if own_law else "blocks",
-                    f"{file} has changed since the sweep began; restore it, or begin a "
-                    "new sweep",
-                )
         yield
     finally:
         _KEEPS = False
@@ -329,82 +290,6 @@ def _users_modules(module: ModuleType) -> list[ModuleType]:
         used = map(sys.modules.get, names)
         waiting += [each for each in used if isinstance(each, ModuleType)]
     return [*found.values()]
-
-
-def made(name: str, field: str, maker: type, parts: Mapping[str, Any]) -> Any:
-    """Makes an object from a user's class, with the arguments that the class accepts.
-
-    Args:
-        name: Name of the class, for messages.
-        field: Field of the scenario that contains the name, for messages.
-        maker: The class. If it is a scalar-templated class of Drake, the signature of
-            its ``_construct`` counts.
-        parts: Values of the available arguments, by name of the argument.
-
-    Returns:
-        The object.
-
-    Raises:
-        InputError: The object cannot be made.
-    """
-    try:
-        return maker(**asked_for(maker, parts))
-    except BaseException as error:  # a user's class may raise any exception
-        if is_interrupt(error):
-            raise
-        raise InputError(
-            field,
-            f"{name!r} cannot be made ({why(error)}); it may take {', '.join(parts)}",
-        ) from error
-
-
-def asked_for(maker: type, parts: Mapping[str, Any]) -> dict[str, Any]:
-    """Selects the arguments that a class accepts, by the signature of its constructor.
-
-    A constructor with ``**kwargs`` passes keywords on to its base class. The function
-    then also considers the constructor of the base class. If all base classes have
-    ``**kwargs``, the class accepts all arguments.
-
-    Args:
-        maker: The class, see ``made``.
-        parts: Values of the available arguments, by name of the argument.
-
-    Returns:
-        The accepted arguments.
-    """
-    asked: set[str] = set()
-    any_keyword = False
-    for construct in constructors(maker):
-        signature = inspect.signature(construct).parameters.values()
-        asked.update(own.name for own in signature)
-        any_keyword = _takes_any(construct)
-    return {key: parts[key] for key in parts if any_keyword or key in asked}
-
-
-def constructors(maker: type) -> Iterator[Callable[..., Any]]:
-    """Yields the functions whose arguments the constructor of a class accepts.
-
-    The first one is that of the class itself. While they have ``**kwargs``, those of
-    the base classes follow.
-
-    Args:
-        maker: The class. For a scalar-templated class of Drake, the function is
-            ``_construct``.
-
-    Yields:
-        Functions with ``self`` as their first argument.
-    """
-    for each in maker.__mro__:
-        construct = vars(each).get("_construct") or vars(each).get("__init__")
-        if inspect.isfunction(construct):
-            yield construct
-            if not _takes_any(construct):
-                break
-
-
-def _takes_any(function: Callable[..., Any]) -> bool:
-    parameters = inspect.signature(function).parameters.values()
-    return any(each.kind is each.VAR_KEYWORD for each in parameters)
 
 
 def _is_users(module: ModuleType, file: str) -> bool:

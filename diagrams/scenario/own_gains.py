@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from diagrams.scenario.fields.field_list import Field
-from diagrams.scenario.own_code import constructors, import_own
+from diagrams.scenario.own_classes import constructors
+from diagrams.scenario.own_code import import_own
 from diagrams.scenario.participants import Robot
 from diagrams.scenario.suggestions import did_you_mean
 from systems.framework.input_error import InputError
