@@ -19,8 +19,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import cloudpickle
-
 from diagrams.scenario.object_source import described, outside_values
 from diagrams.scenario.own_code import is_in_memory, present_files
 from systems.framework.input_error import InputError
@@ -121,6 +119,8 @@ def _kept(own: Any) -> tuple[Any, str]:
 
     Of a function, it is a copy, which later changes of global variables do not affect.
     """
+    import cloudpickle  # only for objects of this process
+
     try:
         text = cloudpickle.dumps(own)
         kept = own if inspect.isclass(own) else cloudpickle.loads(text)
