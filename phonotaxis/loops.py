@@ -191,10 +191,10 @@ def stability(
         InputError: The law or the robot does not exist, or the robot has no linear
             model.
     """
-    laws = [*law_names(laws), *law_names(fields.pop("law", ()))]
+    names = [*law_names(laws), *law_names(fields.pop("law", ()))]
     scenario = changed_scenario(scenario, settings, fields)
     alone, note = chosen_robot(scenario, robot)
-    prepared = prepare_stability(chosen_laws(alone, laws), note, full=full)
+    prepared = prepare_stability(chosen_laws(alone, names), note, full=full)
     return prepared.run(progress or ignore)
 
 

@@ -40,7 +40,7 @@ def library_layouts() -> dict[str, Path]:
 def comparison_plan(
     scenario: str,
     *,
-    laws: str | Iterable[str] | None = None,
+    laws: Laws | None = None,
     runs: int = 50,
     seed: int = 1,
     settings: dict[str, Any] | None = None,
