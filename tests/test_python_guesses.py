@@ -9,6 +9,7 @@ import pytest
 
 import phonotaxis
 from phonotaxis import InputError
+from systems import Block
 from systems.laws.catalog import LAWS
 
 SHORT: dict[str, Any] = {"duration_s": 0.2, "hearing": "ideal"}
@@ -34,6 +35,33 @@ def test_fields_are_keywords():
     )
     assert result.success
     assert result.metrics == result.document()["metrics"]
+
+
+def soft(c, s, push_n=14.0, reach_m=0.45):
+    return push_n * 2.0 ** (-c / reach_m)
+
+
+class Still(Block):
+    """A block of a user's."""
+
+    part = "still"
+
+
+def test_functions_and_classes_are_laws_and_blocks():
+    """And their arguments are fields; ``tests/diagrams/scenario`` has the details."""
+    own: Any = phonotaxis.load_scenario("default", law=soft, blocks=[Still])
+    assert own.law == f"{__name__}:soft"
+    assert own.blocks == (f"{__name__}:Still",)
+    ways: list[Any] = [
+        own.with_({"own_gains.push_n": 3}),
+        own.with_(own_gains={"push_n": 3.0}),
+        phonotaxis.Scenario(own_gains={"push_n": 3.0}),
+        phonotaxis.load_scenario("default", ["own_gains.push_n=3"]),
+    ]
+    assert all(way.own_gains == {"push_n": 3.0} for way in ways)
+    for guess in ({"own_gain.push_n": 3}, {"gains.push_n": 3}, {"soft.push_n": 3}):
+        with pytest.raises(InputError, match="is not a field"):
+            own.with_(guess)
 
 
 def test_dotted_paths_are_keywords_too():
@@ -80,7 +108,9 @@ def test_lists_are_tables_in_notebooks():
     assert laws._repr_html_().count("<tr>") == len(laws)
 
 
-@pytest.mark.parametrize("laws", ["all", "active,conventional", ["active"], "active"])
+@pytest.mark.parametrize(
+    "laws", ["all", "active,conventional", ["active"], "active", soft, [soft, "active"]]
+)
 def test_laws_are_named_alike_everywhere(laws, monkeypatch):
     """One name, a list, a text with commas, or all: in stability and comparisons."""
     from analysis.batches.comparison_plans import comparison_plan

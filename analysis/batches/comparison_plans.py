@@ -14,7 +14,7 @@ from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.loading import load_scenario, read_mapping
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from diagrams.scenario.settings import parse_setting
-from diagrams.scenario.suggestions import law_names
+from diagrams.scenario.suggestions import Laws, law_names
 from systems.framework.input_error import InputError
 from systems.laws.catalog import FORCE_LAWS, LAWS, ROUTE_LAWS
 
@@ -40,7 +40,7 @@ def library_layouts() -> dict[str, Path]:
 def comparison_plan(
     scenario: str,
     *,
-    laws: str | Iterable[str] | None = None,
+    laws: Laws | None = None,
     runs: int = 50,
     seed: int = 1,
     settings: dict[str, Any] | None = None,
@@ -56,9 +56,9 @@ def comparison_plan(
             (a name in the library or a YAML file). A file of layouts is a sweep file
             without ``grid``, ``runs`` and ``pair``. A scenario has a single layout, and
             its runs differ only in their random numbers.
-        laws: Names of the laws. ``all`` means every law for robots of this kind. None
-            means the laws of the papers and driving without avoidance. For a scenario
-            with routes, None means the laws for routes.
+        laws: Names of the laws, or functions and classes. ``all`` means every law for
+            robots of this kind. None means the laws of the papers and driving without
+            avoidance. For a scenario with routes, None means the laws for routes.
         runs: Number of layouts.
         seed: Seed of the layouts and of the noise.
         settings: Values of other fields, by dotted path.
@@ -121,7 +121,7 @@ def _require_one_law(base: Scenario, written: Mapping[str, Any]) -> None:
 def comparison_plans(
     scenarios: Sequence[str] = (),
     *,
-    laws: Iterable[str] | None = None,
+    laws: Laws | None = None,
     velocity_terms: str | None = None,
     runs: int = 50,
     seed: str | None = None,

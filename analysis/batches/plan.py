@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import pickle
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -24,6 +24,7 @@ from analysis.batches.sweep_file import read_sweep
 from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.loading import resolve_sound, written_fields
 from diagrams.scenario.own_code import own_files
+from diagrams.scenario.own_objects import require_file, with_names
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from diagrams.scenario.settings import apply_settings, set_fields
 from diagrams.scenario.yaml_text import dump_yaml
@@ -95,6 +96,17 @@ class SweepPlan(Parameters):
     folder: str = Field(default=".", min_length=1, exclude=True)
     """Folder in which relative paths start: the folder of the sweep's file."""
 
+    def __init__(self, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise explain(error, type(self).model_json_schema(), "a sweep") from None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_objects(cls, data: Any) -> Any:
+        return with_names(data)
+
     @model_validator(mode="after")
     def _check_fields(self) -> SweepPlan:
         earlier: list[str] = []
@@ -129,6 +141,8 @@ class SweepPlan(Parameters):
         for part in ("set", "grid"):
             _check_plain(part, getattr(self, part))
         _check_plain("draw", self.model_dump(include={"draw"}, exclude_none=True))
+        for field, name in self._own_names({**self.set, **self.grid}):
+            require_file(name, field, "a sweep runs in several processes")
         return self
 
     @cached_property
@@ -248,18 +262,32 @@ class SweepPlan(Parameters):
     @cached_property
     def file_digests(self) -> dict[str, str]:
         """SHA-256 of each sound file and user's module that the runs use, by path."""
-        values = {**self.base, **self.grid, **self.model_dump(include={"draw"})["draw"]}
         files: set[Path] = set()
-        for field, text in _texts("", values):
-            if field in ("law", "blocks"):
-                files.update(own_files(text, field))
-            elif field in ("file", "ego_noise_file"):
+        for field, text in self._own_names({**self.base, **self.grid}):
+            files.update(own_files(text, field))
+        for field, text in self._all_texts({**self.base, **self.grid}):
+            if field in ("file", "ego_noise_file"):
                 files.add(Path(self.folder, text).resolve())
         return {
             str(path): hashlib.sha256(path.read_bytes()).hexdigest()
             for path in sorted(files)
             if path.is_file()
         }
+
+    def own_names(self) -> list[str]:
+        """Returns the names of all laws and blocks that the runs use, each once."""
+        named = self._own_names({**self.base, **self.grid})
+        return list(dict.fromkeys(name for _, name in named))
+
+    def _own_names(self, fixed: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        for field, text in self._all_texts(fixed):
+            if field in ("law", "blocks"):
+                yield field, text
+
+    def _all_texts(self, fixed: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yields the texts in ``fixed`` and in the draws, with the names of fields."""
+        drawn = self.model_dump(include={"draw"})["draw"]
+        yield from _texts("", {**fixed, **drawn})
 
     def _draw_run(
         self, run: int, cells: list[tuple[int, dict[str, Any]]], stream: list[int]

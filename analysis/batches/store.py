@@ -32,6 +32,7 @@ from analysis.report.provenance import SCHEMA_VERSION, versions
 from analysis.report.result_directory import whole_directory
 from analysis.run_error import RunError
 from diagrams import write_scenario
+from diagrams.scenario.own_sources import write_own_sources
 from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError, shortened
 
@@ -192,6 +193,7 @@ def _make(out: Path, plan: SweepPlan) -> None:
     (out / PLAN).write_text(dump_plan(plan), "utf-8")
     base = scenario_from_mapping(plan.base)
     write_scenario(base, out)
+    write_own_sources(plan.own_names(), out)
     (out / JOURNAL).touch()
     manifest = {
         "schema_version": SCHEMA_VERSION,

@@ -35,6 +35,7 @@ _FILES = {
     "replay.html": "the run in three dimensions, with curves over time",
     "trajectory.parquet": "one row per tick, SI units",
     "scenario.yaml": "all inputs of the run; `phonotaxis simulate` runs it again",
+    "own_code/SHA256SUMS": "sums of the copies of your own laws and blocks",
     "summary.json": "the numbers of this page, for programs",
 }
 

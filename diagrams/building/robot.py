@@ -197,7 +197,7 @@ def robot_blocks(
     ]
     return with_own_blocks(
         {part_of(block): block for block in ours},
-        robot.blocks,
+        robot,
         {
             "scenario": scenario,
             "robot": robot.robot,

@@ -144,8 +144,12 @@ def write_scenario(scenario: Scenario, directory: Path) -> None:
 
     The files are ``scenario.yaml`` and ``scenario.schema.json``. Text editors use the
     schema to check and complete fields. With the copy, they find the schema even after
-    the directory was moved.
+    the directory was moved. The folder ``own_code`` has the user's own laws and blocks.
     """
+    from diagrams.scenario.own_sources import write_own_sources
+
+    robots = scenario.robots.values()
+    write_own_sources((name for own in robots for name in own.own_code), directory)
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
     (directory / SCENARIO_FILE).write_text(first + dump_scenario(scenario), "utf-8")
     shutil.copyfile(SCHEMA_FILE, directory / SCHEMA_FILE.name)

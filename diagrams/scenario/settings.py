@@ -57,13 +57,22 @@ def all_settings(
 def _plain(key: str, value: Any) -> Any:
     """Returns a copy of the value as plain data, in the form of a file."""
     try:
-        return json.loads(json.dumps(value))
+        return json.loads(json.dumps(value, default=_named))
     except (TypeError, ValueError):
         raise InputError(
             key,
             f"{value!r} is not a plain value; give a number, a text, a truth "
-            "value, or a list or mapping of them",
+            "value, a list or mapping of them, or for a law or block of your own its "
+            "function or class",
         ) from None
+
+
+def _named(value: Any) -> str:
+    if not callable(value):
+        raise TypeError
+    from diagrams.scenario.own_objects import name_of
+
+    return name_of(value)
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from difflib import get_close_matches
+from typing import Any
 
 from systems.framework.input_error import InputError
 
@@ -21,17 +22,29 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     return f" (did you mean {' or '.join(repr(by_folded[each]) for each in near)}?)"
 
 
-def law_names(laws: str | Iterable[str]) -> list[str]:
+#: One law or several, as users give them in Python: a name, or a function or class.
+Laws = str | Callable[..., Any] | Iterable[str | Callable[..., Any]]
+
+
+def law_names(laws: Laws) -> list[str]:
     """Returns the names of laws that a user has given.
 
     Args:
         laws: One text with commas, or several texts, which may have commas, too.
+            Functions and classes may replace texts.
 
     Returns:
         The names in order, each once.
     """
-    texts = [laws] if isinstance(laws, str) else laws
-    names = [name.strip() for text in texts for name in text.split(",")]
+    given = [laws] if isinstance(laws, str) or callable(laws) else laws
+    names: list[str] = []
+    for each in given:
+        if isinstance(each, str):
+            names += [name.strip() for name in each.split(",")]
+        else:
+            from diagrams.scenario.own_objects import name_of
+
+            names.append(name_of(each))
     return list(dict.fromkeys(filter(None, names)))
 
 

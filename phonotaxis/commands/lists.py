@@ -183,25 +183,30 @@ def _add_fields_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--law",
         metavar="NAME",
-        help="list only the fields of a robot with this law",
+        help="list only the fields of a robot with this law, and the gains of your law",
     )
     take_json(parser)
 
 
 def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
     from analysis.report.provenance import SCHEMA_VERSION
-    from diagrams.scenario.fields.field_list import fields_of_law, find_fields
+    from diagrams.scenario.fields.field_list import Field, fields_of_law, find_fields
     from diagrams.scenario.fields.shipped import scenario_schema, schema_text
 
-    schema = scenario_schema()
-    found = find_fields(schema, options.pattern)
+    schema, own = scenario_schema(), list[Field]()
+    if options.law is not None and ":" in options.law:
+        from diagrams.scenario.own_gains import gain_fields
+
+        own = gain_fields(options.law)
+    found = find_fields(schema, options.pattern, own)
     if options.law is not None:
         from diagrams.scenario.suggestions import unknown_law
         from systems.laws.catalog import LAWS
 
-        if options.law not in LAWS:
+        if options.law not in LAWS and ":" not in options.law:
             raise unknown_law(options.law, LAWS)
-        found = fields_of_law(found, options.law, LAWS[options.law].robot)
+        kind = LAWS[options.law].robot if options.law in LAWS else "follower"
+        found = fields_of_law(found, options.law, kind)
     if options.schema:
         return _printed(schema, schema_text().rstrip("\n"))
     listed = [asdict(field) for field in found]
@@ -328,6 +333,7 @@ FIELDS = Command(
         "fields room",
         "fields 'obstacles.*'",
         "fields --law active",
+        "fields --law my_laws.py:soft own_gains",
         "fields reverberation --json",
         "fields --schema > scenario.schema.json",
     ),

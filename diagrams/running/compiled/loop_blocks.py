@@ -13,7 +13,7 @@ from pydrake.systems.framework import Diagram, PortDataType
 from diagrams.building.builder import audible_sounds, robot_of
 from diagrams.building.robot import columns_of, make_source, make_world, parts_of
 from diagrams.building.world_blocks import radio_nodes
-from diagrams.scenario.own_code import loaded_digests
+from diagrams.scenario.own_versions import loaded_digests
 from diagrams.scenario.participants import Router
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step

@@ -119,4 +119,6 @@ def _unknown(
     if constant := constant_now(".".join(loc[3:] if loc[0] == "robots" else loc)):
         return f"is no longer a field; it is now {constant}; remove it"
     hint = near_field(schema, place)
+    if not hint and place[-2:-1] == ["laws"]:
+        return "is not a law of phonotaxis; write gains of your own law as own_gains"
     return f"is not a field of {what}{hint or '; remove it'}"

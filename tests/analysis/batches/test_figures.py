@@ -106,6 +106,7 @@ def test_a_wrong_name_is_refused(quantity, over, by, message):
         ("laws.active.reach_m", "reach of law active (m)"),
         ("attraction.damping_n_s_m", "damping of attraction (N s/m)"),
         ("robots.second.robot.mass_kg", "mass of robot of second (kg)"),
+        ("own_gains.reach_m", "gain reach_m"),
         ("law", "law"),
         ("no.such.field", "no.such.field"),
     ],

@@ -108,7 +108,13 @@ def test_one_of_everything_runs(tmp_path):
     scenario = load_scenario(write(tmp_path, ONE_OF_EVERYTHING))
     run, robot = untouched(scenario), untouched(scenario.of_robot("robot").follower)
     assert run == {"engine", "odor", "radio", "wind"}
-    assert robot == {"blocks", "obstacle_sensing", "microphones", "tdoa"}
+    assert robot == {
+        "blocks",
+        "own_gains",
+        "obstacle_sensing",
+        "microphones",
+        "tdoa",
+    }
     assert simulate(scenario).simulated_s == pytest.approx(0.1)
 
 
