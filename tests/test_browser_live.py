@@ -30,7 +30,7 @@ def test_the_robot_moves_while_the_run_is_computed(browser):
     meshcat = start_meshcat()
     page = browser.new_page(viewport={"width": 900, "height": 700})
     page.goto(meshcat.web_url())
-    seen = []
+    seen: list[np.ndarray] = []
 
     def look(time: float) -> None:
         if len(seen) < 2 and time >= 3.0 * len(seen):

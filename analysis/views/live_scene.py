@@ -42,6 +42,7 @@ from analysis.views.scene import (
     still_layers,
 )
 from diagrams import Scenario
+from diagrams.scenario.bodies import Path
 from diagrams.scenario.participants import HasRangeSensors, Robot, Router
 from systems.world.plane import control_point
 
@@ -77,7 +78,7 @@ class LiveScene:
         }
         self._bodies = scene_bodies(scenario, np.zeros(1), starts)
         paths = {name: each.path() for name, each in scenario.sources.items()}
-        self._paths = {
+        self._paths: dict[str, Path] = {
             **{name: path for name, path in paths.items() if path.moves},
             **{o.name: o.path() for o in scenario.obstacles if o.path().moves},
         }
@@ -142,8 +143,8 @@ class LiveScene:
         for name, bursts in self._bursts.items():
             ring = ring_at(time, bursts)
             for number in range(len(RINGS_M)):
-                path = f"{self._bodies[name].path}/rings/{number + 1}"
-                self._switch(path, seen=number == ring)
+                place = f"{self._bodies[name].path}/rings/{number + 1}"
+                self._switch(place, seen=number == ring)
 
     def _things(self) -> Iterator[Thing]:
         scenario, bodies = self._scenario, self._bodies

@@ -67,7 +67,7 @@ class LiveView(LeafSystem):
 
     def _show(self, context: Any) -> EventStatus:
         ports = map(self.get_input_port, range(self.num_input_ports()))
-        values = {
+        values: dict[str, Any] = {
             port.get_name(): port.Eval(context)
             for port in ports
             if port.HasValue(context)
@@ -115,6 +115,9 @@ def with_live_view(follower: SoundFollower, meshcat: Meshcat) -> SoundFollower:
 
 def start_meshcat() -> Meshcat:
     """Starts Meshcat on this computer, without a message of Drake.
+
+    Returns:
+        Drake's 3D viewer, which serves its page to browsers on this computer.
 
     Raises:
         RunError: No port is free.

@@ -56,7 +56,16 @@ def checked_waypoints(
     times: Sequence[float],
     at_end: AtEnd,
 ) -> Waypoints:
-    """Returns the waypoints with a pause each. A loop gets its first point at its end.
+    """Checks the waypoints of a path, and completes them.
+
+    Args:
+        points: Points in W, m.
+        pauses: Pause at each point, s, or nothing.
+        times: Time of each point, s, or nothing.
+        at_end: ``stop``, ``shuttle`` or ``loop``, see ``WaypointPath``.
+
+    Returns:
+        The waypoints with a pause each. A loop has its first point again at its end.
 
     Raises:
         InputError: There is no point, or the pauses or times do not fit the points.
@@ -102,6 +111,9 @@ def plan_motion(
         at_end: ``stop``, ``shuttle`` or ``loop``, see ``WaypointPath``.
         corner_radius: Largest radius of the corners, m.
         limits: Limits of the motion.
+
+    Returns:
+        The motion.
 
     Raises:
         InputError: Two neighbors coincide, or the times need a motion beyond a limit.
@@ -253,7 +265,7 @@ class _TimedLap(NamedTuple):
         begin: float,
         ends: tuple[float, float],
     ) -> list[Piece]:
-        """Returns the pieces.
+        """Computes the pieces of a lap.
 
         At a waypoint where the body does not stop, its speed is the lower of the mean
         speeds of both legs.
@@ -263,6 +275,12 @@ class _TimedLap(NamedTuple):
             later: Time by which all times are later than stated, s.
             begin: Time at which the body leaves the first waypoint, s.
             ends: Speeds at the first and the last waypoint, m/s.
+
+        Returns:
+            The pieces.
+
+        Raises:
+            InputError: The body leaves a waypoint after the time of the next one.
         """
         limits, times, speed = self.limits, self.waypoints.times, ends[0]
         stops: list[list[Piece]] = []

