@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
+    from analysis.views.live_view import add_live_view
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
     from phonotaxis.arrays import ResolutionResult, array_resolution
@@ -64,6 +65,7 @@ __all__ = [
     "SweepPlan",
     "SweepResult",
     "__version__",
+    "add_live_view",
     "array_resolution",
     "calibrate",
     "calibrate_delays",
@@ -112,6 +114,7 @@ _HOMES = {
     "StabilityResult": "phonotaxis.loops",
     "SweepPlan": "analysis.batches.plan",
     "SweepResult": "phonotaxis.batches",
+    "add_live_view": "analysis.views.live_view",
     "array_resolution": "phonotaxis.arrays",
     "calibrate": "phonotaxis.recordings",
     "calibrate_delays": "phonotaxis.delays",

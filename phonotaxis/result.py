@@ -103,6 +103,8 @@ class Prepared(Generic[Output_co]):
     """Amount of work that earlier runs of the command have already done."""
     left: Callable[[], str] = str
     """Returns a text about files that remain after an interrupt; it can be empty."""
+    stay: Callable[[], None] | None = None
+    """Goes on after the command has printed its result, until an interrupt."""
 
 
 def ignore(done: Any) -> None:

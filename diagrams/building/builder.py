@@ -12,6 +12,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
 from diagrams.building.robot import (
+    SHOWN,
     Parts,
     make_robot,
     make_source,
@@ -101,6 +102,11 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     ``make_source``). Each robot can see and hit the obstacles, the other robots and the
     sources, and it hears all sounds.
 
+    You can add the diagram to a diagram of your own. Its outputs are, for example,
+    ``robot.pose_WB`` and ``robot.velocity_WB`` of each robot, ``source.pose_WS`` of
+    each source, and ``obstacles.poses_WO``. A robot also has the further outputs of
+    ``make_robot`` that show what it senses, for example ``robot.p_WS_estimated``.
+
     Args:
         scenario: The scenario to build.
         log: Whether each robot logs the columns of its blocks.
@@ -129,6 +135,9 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     world = _World(builder, scenario, obstacles, sources, followers, shared)
     for name in followers:
         world.surround(name)
+    _export(builder, followers, ("pose_WB", "velocity_WB", *SHOWN))
+    _export(builder, sources, ("pose_WS", "v_WS"))
+    _export(builder, {"obstacles": obstacles}, ("poses_WO",))
     diagram = builder.Build()
     diagram.set_name("sound_follower")
     return SoundFollower(
@@ -139,6 +148,16 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
         obstacles,
         parts_of(shared) if shared is not None else None,
     )
+
+
+def _export(
+    builder: DiagramBuilder, systems: Mapping[str, Any], ports: tuple[str, ...]
+) -> None:
+    """Makes outputs of systems to outputs of the diagram, named ``<system>.<port>``."""
+    for name, system in systems.items():
+        for port in ports:
+            if system.HasOutputPort(port):
+                builder.ExportOutput(system.GetOutputPort(port), f"{name}.{port}")
 
 
 def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:

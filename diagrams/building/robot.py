@@ -40,6 +40,9 @@ from systems.sound.parameters import SoundParameters
 #: all inputs ``emission_<name>``.
 OUTSIDE = "pose_WS", "poses_WO", "sizes", "emission", "wind", "plume", "air"
 
+#: Outputs of a robot that a live view shows, see ``make_robot``.
+SHOWN = "echo", "p_WS_estimated", "target_state", "target_valid"
+
 
 @dataclass(frozen=True)
 class Parts:
@@ -233,8 +236,10 @@ def make_robot(
     - ``emission_<name>`` of each other source
     - ``wind``, ``plume`` and ``air`` of the world
 
-    The outputs are ``pose_WB`` and ``velocity_WB``. A robot with a loudspeaker also has
-    ``own_emission``. A robot that searches also has ``frames``.
+    The outputs are ``pose_WB`` and ``velocity_WB``, and those of ``echo``,
+    ``p_WS_estimated``, ``target_state`` and ``target_valid`` that a block publishes. A
+    robot with a loudspeaker also has ``own_emission``. A robot that searches also has
+    ``frames``.
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
@@ -261,6 +266,10 @@ def make_robot(
     connect_by_name(builder, blocks, OUTSIDE)
     for port in ("pose_WB", "velocity_WB"):
         builder.ExportOutput(plant.GetOutputPort(port), port)
+    for port in SHOWN:
+        publishers = [block for block in blocks if block.HasOutputPort(port)]
+        if len(publishers) == 1:
+            builder.ExportOutput(publishers[0].GetOutputPort(port), port)
     robot = scenario.only
     if robot.searches is not None:
         builder.ExportOutput(by_part["controller"].GetOutputPort("frames"), "frames")

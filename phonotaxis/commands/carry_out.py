@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from contextlib import ExitStack, nullcontext, redirect_stdout
+from contextlib import ExitStack, nullcontext, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +73,9 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
     except OSError as error:
         text = f"standard output cannot be written ({error.strerror}){where}"
         raise RunError(text) from error
+    if prepared.stay is not None:
+        with suppress(KeyboardInterrupt), interrupts.at_once():
+            prepared.stay()
     if (failure := result.failure(out)) is not None:
         raise failure
 

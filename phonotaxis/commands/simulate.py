@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from dataclasses import replace
@@ -45,6 +47,17 @@ def _add_arguments(parser: ArgumentParser) -> None:
         "microphones, and needs ffmpeg",
     )
     parser.add_argument(
+        "--live",
+        action="store_true",
+        help="show the run in a browser while Drake's engine computes it",
+    )
+    parser.add_argument(
+        "--rate",
+        type=float,
+        metavar="RATE",
+        help="speed of --live: 1 is real time (default), 0 as fast as possible",
+    )
+    parser.add_argument(
         "--no-plots",
         action="store_true",
         help="write no pictures: only the replay and the numbers",
@@ -71,11 +84,29 @@ def _prepare(options: Namespace, take: Take) -> Prepared[RunResult]:
     if options.movie is not None:
         movie = SavedMovie(options.movie, scenario)
         _require_outside(place, "movie", options.movie, movie.path)
+    if options.rate is not None and not options.live:
+        raise InputError("rate", f"{options.rate:g} needs --live; add --live")
     say(f"simulating {scenario.name}")
 
     from phonotaxis.runs import prepare_simulation
 
-    prepared = prepare_simulation(scenario, saved=saved, movie=movie)
+    if options.live:
+        from analysis.views.live_view import start_meshcat
+
+        meshcat = start_meshcat()
+        prepared = prepare_simulation(
+            scenario,
+            engine="drake",
+            saved=saved,
+            movie=movie,
+            meshcat=meshcat,
+            rate=options.rate,
+        )
+        print(f"live view: {meshcat.web_url()}", file=sys.stderr, flush=True)
+        if sys.stdin.isatty() and sys.stderr.isatty():
+            prepared = replace(prepared, stay=_stay)
+    else:
+        prepared = prepare_simulation(scenario, saved=saved, movie=movie)
 
     def run(progress: Callable[[float], None]) -> RunResult:
         try:
@@ -84,6 +115,13 @@ def _prepare(options: Namespace, take: Take) -> Prepared[RunResult]:
             raise RunError(str(error)) from error
 
     return replace(prepared, run=run)
+
+
+def _stay() -> None:
+    """Keeps the live view open until an interrupt."""
+    print("the live view stays open until Ctrl-C", file=sys.stderr, flush=True)
+    while True:
+        time.sleep(3600.0)
 
 
 def _require_outside(place: Place, option: str, given: str, path: Path) -> None:
@@ -133,6 +171,7 @@ COMMAND = Command(
         "simulate my_scenario.yaml --seed 7 --out results/mine",
         "simulate --set source.speed_m_s=0.2 --set hearing=ideal --json",
         "simulate --law my_laws.py:soft --no-plots",
+        "simulate --live --rate 2",
         "simulate results/latest",
     ),
     synonyms=("run", "start"),

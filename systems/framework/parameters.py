@@ -48,6 +48,7 @@ NonNegativeDamping = Annotated[float, Field(ge=0.0, le=_LARGEST)]
 # YAML has lists, but no tuples. Therefore these types are not strict.
 Point = Annotated[tuple[Coordinate, Coordinate], Strict(False)]
 Waypoints = Annotated[tuple[Point, ...], Strict(False), Field(max_length=1_000)]
+Times = Annotated[tuple[Time, ...], Strict(False), Field(max_length=1_000)]
 Size = Annotated[tuple[Length, Length], Strict(False)]
 
 
