@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from phonotaxis.arrays import ResolutionResult, array_resolution
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
     from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
+    from phonotaxis.law_runs import LawsResult, simulate_laws
     from phonotaxis.listening import ListenResult, listen
     from phonotaxis.listings import Listing, laws, scenarios
     from phonotaxis.loops import DesignResult, StabilityResult, design, stability
@@ -44,6 +45,7 @@ __all__ = [
     "DelayResult",
     "DesignResult",
     "InputError",
+    "LawsResult",
     "ListenResult",
     "Listing",
     "LocateResult",
@@ -73,6 +75,7 @@ __all__ = [
     "main",
     "scenarios",
     "simulate",
+    "simulate_laws",
     "stability",
     "sweep",
 ]
@@ -88,6 +91,7 @@ _HOMES = {
     "DelayResult": "phonotaxis.delays",
     "DesignResult": "phonotaxis.loops",
     "InputError": "systems.framework.input_error",
+    "LawsResult": "phonotaxis.law_runs",
     "ListenResult": "phonotaxis.listening",
     "Listing": "phonotaxis.listings",
     "LocateResult": "phonotaxis.recordings",
@@ -115,6 +119,7 @@ _HOMES = {
     "scenarios": "phonotaxis.listings",
     "locate_delays": "phonotaxis.delays",
     "simulate": "phonotaxis.runs",
+    "simulate_laws": "phonotaxis.law_runs",
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",
 }

@@ -83,6 +83,24 @@ class Result(Output):
             self.write({**self.document(), "out": str(shown)}, partial)
         return shown
 
+    def save_figures(self, directory: str | Path) -> list[Path]:
+        """Writes all figures as PDF, SVG and PNG files, for papers.
+
+        Args:
+            directory: Directory, which is created if it does not exist.
+
+        Returns:
+            Paths of the files.
+        """
+        from analysis.report.figure_files import write_figures
+
+        return write_figures(self.figures(), Path(directory))
+
+    def figures(self) -> dict[str, Figure]:
+        """Draws all figures of the result, by name; those of ``plot`` at least."""
+        figures = self.plot()
+        return figures if isinstance(figures, dict) else {"figure": figures}
+
 
 Output_co = TypeVar("Output_co", bound=Output, covariant=True)
 

@@ -65,7 +65,7 @@ def call(capsys, *words: str) -> tuple[int, str, str]:
         ("simulate --set robot.width=0.5", "width_m"),
         ("simulate --set obstacles.cart.speed_m_s=1", "use 'box'"),
         ("compare --laws active dwa", "--law a,b"),
-        ("design --law active", "--set law=active"),
+        ("design --law active,dwa", "one law at a time"),
         ("locate a.wav --array x", "--geometry"),
         ("listen --list-devices", "phonotaxis doctor"),
         ("laws activ", "'active'"),

@@ -160,6 +160,12 @@ def _find(source: str | Path) -> Path:
     if str(source) and path.is_dir():
         if (path / SCENARIO_FILE).is_file():
             return path / SCENARIO_FILE
+        for below in sorted(path.glob(f"*/{SCENARIO_FILE}")):
+            raise InputError(
+                "scenario",
+                f"{source} has the runs of several laws; choose one, for example "
+                f"phonotaxis simulate {below.parent}",
+            )
         raise InputError(
             "scenario",
             f"the directory {source} has no {SCENARIO_FILE}; use a result directory, "

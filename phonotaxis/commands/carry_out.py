@@ -98,10 +98,17 @@ def _written(
     if place is None:
         if result.out is not None:
             command.write(options, result, document, result.out)
+            _write_figures(options, result, result.out)
         return document, result.out
     document = {**document, "out": str(place.out)}
     command.write(options, result, document, place.directory)
+    _write_figures(options, result, place.directory)
     return document, place.out
+
+
+def _write_figures(options: Namespace, result: Result, directory: Path) -> None:
+    if getattr(options, "figures", False):
+        result.save_figures(directory / "figures")
 
 
 def _print(

@@ -19,6 +19,7 @@ from phonotaxis.commands.arguments import (
     SCENARIO_WORDS,
     completed_by,
     take_json,
+    take_laws,
 )
 from phonotaxis.commands.command import Command, Printed, Take
 from phonotaxis.result import Prepared
@@ -180,28 +181,19 @@ def _add_fields_arguments(parser: ArgumentParser) -> None:
         action="store_true",
         help="print the JSON Schema, for editors and other programs",
     )
-    parser.add_argument(
-        "--law",
-        metavar="NAME",
-        help="list only the fields of a robot with this law",
-    )
+    take_laws(parser, "lists only the fields of robots with these laws")
     take_json(parser)
 
 
 def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
     from analysis.report.provenance import SCHEMA_VERSION
-    from diagrams.scenario.fields.field_list import fields_of_law, find_fields
+    from diagrams.scenario.fields.field_list import find_fields
     from diagrams.scenario.fields.shipped import scenario_schema, schema_text
 
     schema = scenario_schema()
     found = find_fields(schema, options.pattern)
-    if options.law is not None:
-        from diagrams.scenario.suggestions import unknown_law
-        from systems.laws.catalog import LAWS
-
-        if options.law not in LAWS:
-            raise unknown_law(options.law, LAWS)
-        found = fields_of_law(found, options.law, LAWS[options.law].robot)
+    if options.law:
+        found = _of_laws(options.law, found)
     if options.schema:
         return _printed(schema, schema_text().rstrip("\n"))
     listed = [asdict(field) for field in found]
@@ -209,6 +201,22 @@ def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
         {"schema_version": SCHEMA_VERSION, "fields": listed},
         "\n".join(map(_paragraph, found)),
     )
+
+
+def _of_laws(given: list[str], fields: list[Field]) -> list[Field]:
+    """Returns the fields of robots that have one of the laws."""
+    from diagrams.scenario.fields.field_list import fields_of_law
+    from diagrams.scenario.suggestions import law_names, unknown_law
+    from systems.framework.input_error import InputError
+    from systems.laws.catalog import LAWS
+
+    names = law_names(given)
+    names = [*LAWS] if "all" in names else names
+    for law in names:
+        if law not in LAWS:
+            raise InputError("law", unknown_law(law, LAWS).message)
+    own = [fields_of_law(fields, law, LAWS[law].robot) for law in names]
+    return [field for field in fields if any(field in each for each in own)]
 
 
 def _paragraph(field: Field) -> str:
