@@ -58,7 +58,7 @@ def test_assignment_names_the_copy():
             setattr(changed, name, "active")
     with pytest.raises(AttributeError, match="lawn"):
         getattr(scenario, "law" + "n")
-    with pytest.raises(InputError, match=r"lawn: is not a field .*did you mean 'law'"):
+    with pytest.raises(InputError, match=r"lawn: did you mean 'law'"):
         scenario.with_(lawn="active")
     with pytest.raises(InputError, match="law: 'activ' is not known"):
         phonotaxis.Scenario(law="activ")

@@ -8,6 +8,13 @@ from difflib import get_close_matches
 from systems.framework.input_error import InputError
 
 
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Returns the known name that is most similar to a name; empty if none is."""
+    by_folded = {each.casefold(): each for each in known}
+    near = get_close_matches(name.casefold(), by_folded, n=1)
+    return by_folded[near[0]] if near else ""
+
+
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """Returns a text that suggests similar names, for the end of an error message.
 

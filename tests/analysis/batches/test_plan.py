@@ -230,6 +230,17 @@ def test_bad_plan_is_refused(tmp_path, changes, field, hint):
     assert hint in caught.value.message
 
 
+def test_a_scenario_is_no_sweep(tmp_path):
+    """One line names what to write; so does a field of the scenario in a sweep."""
+    file = written(tmp_path / "mine.yaml", "duration_s: 5\nlaw: active\n")
+    with pytest.raises(InputError, match=r"is a scenario; .*'scenario: mine.yaml'") as e:
+        load_sweep(file)
+    assert len(e.value.all) == 1
+    file = written(tmp_path / "mine.yaml", "runs: 5\nlaw: active\n")
+    with pytest.raises(InputError, match=r"law: .*write 'set: \{law: \.\.\.\}'"):
+        load_sweep(file)
+
+
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
