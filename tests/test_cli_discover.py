@@ -126,3 +126,36 @@ def test_result_directory_has_what_an_editor_needs(tmp_path):
     assert first == "# yaml-language-server: $schema=scenario.schema.json"
     assert (tmp_path / "scenario.schema.json").read_text() == schema_text()
     assert load_scenario(tmp_path / "scenario.yaml") == load_scenario("u_trap")
+
+
+def test_the_scenario_of_a_result_begins_with_what_differs(tmp_path):
+    """The comments are settings: on all defaults, they make the same scenario."""
+    from diagrams import write_scenario
+    from diagrams.scenario.differences import differences
+
+    changed = load_scenario({"law": "conventional", "source": {"speed_m_s": 0.2}})
+    write_scenario(changed, tmp_path)
+    text = (tmp_path / "scenario.yaml").read_text("utf-8")
+    lines = text.partition("# All fields:")[0].splitlines()
+    assert lines[1:] == [
+        "# Fields that differ from their defaults:",
+        '#   law: "conventional"',
+        "#   source.speed_m_s: 0.2",
+    ]
+    assert load_scenario(tmp_path) == changed
+    for name in ("u_trap", "robots_4", "odor_search"):
+        whole = load_scenario(name, seed=3)
+        names = {"name": whole.name, "description": whole.description}
+        again = load_scenario(_tree(differences(whole) | names))
+        assert again == whole
+
+
+def _tree(settings):
+    data = {}
+    for path, value in settings.items():
+        *parents, last = path.split(".")
+        node = data
+        for part in parents:
+            node = node.setdefault(part, {})
+        node[last] = value
+    return data

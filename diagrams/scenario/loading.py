@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -139,15 +140,30 @@ def dump_scenario(scenario: Scenario) -> str:
     return dump_yaml(scenario.model_dump(mode="json"))
 
 
-def write_scenario(scenario: Scenario, directory: Path) -> None:
+def write_scenario(
+    scenario: Scenario, directory: Path, *, relative: bool = False
+) -> None:
     """Writes a whole scenario and a copy of its JSON Schema to an existing directory.
 
-    The files are ``scenario.yaml`` and ``scenario.schema.json``. Text editors use the
+    The files are ``scenario.yaml`` and ``scenario.schema.json``. Comments at the
+    beginning list the fields that differ from their defaults. Text editors use the
     schema to check and complete fields. With the copy, they find the schema even after
     the directory was moved.
+
+    Args:
+        scenario: The scenario.
+        directory: Existing directory.
+        relative: Whether paths of sound files start in the directory. Otherwise, they
+            are absolute.
     """
+    from diagrams.scenario.differences import differences_text
+
+    data = scenario.model_dump(mode="json")
+    if relative:
+        _change_sound(data, lambda file: os.path.relpath(file, directory))
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
-    (directory / SCENARIO_FILE).write_text(first + dump_scenario(scenario), "utf-8")
+    text = first + differences_text(scenario) + dump_yaml(data)
+    (directory / SCENARIO_FILE).write_text(text, "utf-8")
     shutil.copyfile(SCHEMA_FILE, directory / SCHEMA_FILE.name)
 
 
@@ -217,6 +233,11 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
         folder: Folder to which the relative paths refer: the folder of the scenario
             file, or the working directory.
     """
+    _change_sound(data, lambda file: str((folder / file).resolve()))
+
+
+def _change_sound(data: dict[str, Any], change: Callable[[str], str]) -> None:
+    """Changes the paths of all sound files in the fields of a scenario."""
     for place in [
         data,
         *_participants(data, "robots").values(),
@@ -229,7 +250,7 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
         ):
             fields = place.get(group)
             if isinstance(fields, dict) and isinstance(fields.get(key), str):
-                fields[key] = str((folder / fields[key]).resolve())
+                fields[key] = change(fields[key])
 
 
 def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]:
