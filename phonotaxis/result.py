@@ -41,6 +41,19 @@ class Output(ABC):
 class Result(Output):
     """Result of a public function, and of the command with the same name."""
 
+    if not TYPE_CHECKING:  # type checkers report unknown attributes themselves
+
+        def __getattr__(self, name: str) -> Any:
+            """Raises an error that names the attribute that is meant."""
+            if hasattr(type(self), name):  # a property has raised an AttributeError
+                return object.__getattribute__(self, name)
+            from phonotaxis.other_names import of_result
+
+            known = {*dir(type(self)), *vars(self)}
+            hint = of_result(name, (each for each in known if each[0] != "_"))
+            kind = type(self).__name__
+            raise AttributeError(f"{kind!r} object has no attribute {name!r}{hint}")
+
     @property
     def notes(self) -> tuple[str, ...]:
         """Warnings and remarks about the result, each in one line."""

@@ -10,6 +10,7 @@ import pytest
 import phonotaxis
 from phonotaxis import InputError
 from systems.laws.catalog import LAWS
+from tests import guesses
 
 SHORT: dict[str, Any] = {"duration_s": 0.2, "hearing": "ideal"}
 
@@ -101,3 +102,29 @@ def test_laws_are_named_alike_everywhere(laws, monkeypatch):
     found.clear()
     phonotaxis.stability("default", law=laws)
     assert found
+
+
+PYTHON = guesses.NOTED_PYTHON | guesses.OWN_PYTHON
+
+
+@pytest.fixture(scope="module")
+def result() -> phonotaxis.RunResult:
+    return phonotaxis.simulate("default", SHORT, duration_s=2.0)
+
+
+@pytest.mark.parametrize("code", PYTHON)
+def test_a_guess_in_python(code, result):
+    from analysis.batches.comparison_plans import comparison_plan
+
+    names = {
+        "phonotaxis": phonotaxis,
+        "comparison_plan": comparison_plan,
+        "result": result,
+        "scenario": result.scenario,
+        "SHORT": SHORT,
+    }
+    try:
+        answer = repr(eval(code, names))
+    except (AttributeError, TypeError, InputError) as error:
+        answer = str(error)
+    assert (PYTHON[code] or "") in answer

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from diagrams.scenario.fields.shipped import scenario_schema
-from diagrams.scenario.loading import read_mapping
+from diagrams.scenario.loading import library_scenarios, read_mapping
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 
@@ -21,6 +21,12 @@ def read_sweep(path: str | Path) -> dict[str, Any]:
     The result also has the folder of the file as ``folder``. Raises InputError if the
     file cannot be read.
     """
+    if str(path) in library_scenarios():
+        raise InputError(
+            "sweep",
+            f"{path} is a scenario; write 'scenario: {path}' into a sweep file, or use "
+            f"'phonotaxis compare {path}'",
+        )
     path = require_file(path, "sweep", "YAML")
     data = read_mapping(path)
     for part in ("set", "grid", "draw", "require"):  # a heading with nothing below it

@@ -57,11 +57,12 @@ def load_scenario(
     from diagrams.scenario.scenario import scenario_from_mapping
     from diagrams.scenario.settings import all_settings, apply_settings, plain_settings
 
+    settings = all_settings(overrides, fields)
     if isinstance(source, Mapping):
         data = {"name": "scenario", **dict(plain_settings(source))}
     else:
         data = written_fields(source)
-    apply_settings(data, all_settings(overrides, fields))
+    apply_settings(data, settings)
     resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
 
@@ -191,10 +192,14 @@ def _find(source: str | Path) -> Path:
         if path.is_file():
             return path
         raise InputError(
-            "scenario", f"there is no file {source}; check the path, or use {known}"
+            "scenario",
+            f"there is no file {source}; check the path, or use {known}"
+            f"{did_you_mean(path.stem, library)}",
         )
     hint = did_you_mean(str(source), library)
-    if "=" in str(source):
+    if path.with_suffix(".yaml").is_file():
+        hint = f" (did you mean '{path.with_suffix('.yaml')}'?)"
+    elif "=" in str(source):
         hint = f"; to set a field, write --set {source}"
     elif str(source) in known_laws():
         hint = "; laws are listed with commas and without spaces, as in --law a,b"

@@ -74,9 +74,9 @@ def parse_setting(text: str) -> tuple[str, Any]:
     """
     key, equals, value_text = text.partition("=")
     if not equals or not all(key.split(".")):
-        raise InputError(
-            text or "--set", "is not of the form key=value, for example seed=2"
-        )
+        key, _, value = re.sub(r"\s*:\s*", "=", text, count=1).partition("=")
+        remedy = f"write {key or 'seed'}={value or 'VALUE'}"
+        raise InputError(text or "--set", f"is not of the form key=value; {remedy}")
     return _dotted(key), parse_yaml(value_text, key)
 
 

@@ -47,6 +47,8 @@ def unknown_law(name: str, known: Collection[str]) -> InputError:
 
     ``known`` has the names of the known laws.
     """
+    if name.endswith(".py"):
+        return InputError("", f"{name!r} is a file; name its law: {name}:NAME")
     near = did_you_mean(name, known)
     return InputError(
         "",  # the model with the field adds the path

@@ -308,7 +308,7 @@ SCENARIOS = Command(
         "scenarios u_trap",
         "scenarios u_trap --copy my_scenario.yaml",
     ),
-    synonyms=("list", "show"),
+    synonyms=("list", "show", "scenario"),
 )
 LAWS = Command(
     "laws",
@@ -319,6 +319,7 @@ LAWS = Command(
         "laws",
         "laws active",
     ),
+    synonyms=("law",),
 )
 RESULTS = Command(
     "results",

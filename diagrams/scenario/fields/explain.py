@@ -25,6 +25,7 @@ _KINDS = {
 }
 #: Types of errors of pydantic. ``_FLAT`` is our own: numbers in place of lists.
 _LISTS, _FLAT = ("list_type", "tuple_type"), "flat_list"
+_RANGES = ("less_than", "less_than_equal", "greater_than", "greater_than_equal")
 _MAPPINGS = ("model_type", "dict_type", "model_attributes_type", "mapping_type")
 
 
@@ -166,17 +167,24 @@ def _whole_lists(found: Sequence[ErrorDetails]) -> list[ErrorDetails]:
 
 def _of_type(details: ErrorDetails, field: str, schema: Mapping[str, Any]) -> str:
     """Returns the remedy for a value of a wrong type; empty if pydantic tells it."""
-    kind, given = details["type"], details["input"]
+    kind, given, text = details["type"], details["input"], ""
+    known = next((each for each in list_fields(schema) if each.path == field), None)
     if kind == _FLAT:
-        return f"give a list of lists, {[given]}"
-    if kind in _LISTS:
-        if isinstance(given, str) and "," in given:
-            return f"give a list, [{given}]"
-        known = (each.default for each in list_fields(schema) if each.path == field)
-        example = next(known, None)
-        return f"give a list, for example {example}" if example else "give a list"
-    if kind in _MAPPINGS:
+        text = f"give a list of lists, {[given]}"
+    elif kind in _LISTS and isinstance(given, str) and "," in given:
+        text = f"give a list, [{given}]"
+    elif kind in _LISTS:
+        example = f", for example {known.default}" if known and known.default else ""
+        text = f"give a list{example}"
+    elif field == "law" and isinstance(given, list | tuple):
+        text = "give one law; phonotaxis.simulate_laws(...) runs several"
+    elif kind in _MAPPINGS and field == "laws":
+        text = "these are gains; a law is chosen by the field law"
+    elif kind in _MAPPINGS:
+        text = "give its fields as a mapping; {} means their defaults"
         if isinstance(given, str) and given.casefold().endswith((".wav", ".flac")):
-            return f"write {field}.kind=wav and {field}.file={given}"
-        return "give its fields as a mapping; {} means their defaults"
-    return ""
+            text = f"write {field}.kind=wav and {field}.file={given}"
+    elif kind in _RANGES and known:
+        message = details["msg"][0].lower() + details["msg"][1:]
+        text = f"{message} {known.unit}".rstrip()
+    return text

@@ -76,6 +76,10 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
         Path of the field, empty if there is no such field.
     """
     *parents, last = place
+    if "/" in last:
+        *parents, last = place = [*parents, *last.split("/")]
+        if last in at_place(schema, parents):
+            return ".".join(place)
     siblings = list(at_place(schema, parents))
     found = (
         next((each for each in siblings if each.startswith(f"{last}_")), "")
