@@ -81,6 +81,8 @@ def test_nine_of_ten_guesses_help():
     for tables in (noted, own, *zip(noted, own, strict=True)):
         answers = [answer for table in tables for answer in table.values()]
         assert sum(answer is not None for answer in answers) >= 0.9 * len(answers)
+    every = [answer for table in noted + own for answer in table.values()]
+    assert sum(answer is not None for answer in every) >= 0.95 * len(every)
     assert sum(map(len, noted)) >= 85
     assert sum(map(len, own)) >= 40
 

@@ -56,7 +56,13 @@ def take_laws(parser: ArgumentParser, about: str) -> None:
 
 
 def law_of(options: Namespace) -> list[str]:
-    """Returns the setting of the law that the user has named; empty without a law.
+    """Lists the setting of the law that the user has named.
+
+    Args:
+        options: Parsed options of the command line.
+
+    Returns:
+        One text ``law=NAME``; nothing if the user has named no law.
 
     Raises:
         InputError: There are several laws.
@@ -80,7 +86,14 @@ def take_seed(
 
 
 def whole_seed(options: Namespace, default: Default) -> int | Default:
-    """Returns the seed that the user has given, or the default.
+    """Reads the seed that the user has given.
+
+    Args:
+        options: Parsed options of the command line.
+        default: Result if the user has given no seed.
+
+    Returns:
+        The seed.
 
     Raises:
         InputError: The text is not a whole number from 0 on.
@@ -126,6 +139,10 @@ def take_out(parser: ArgumentParser, about: str) -> None:
 
 def take_wanted_place(options: Namespace, take: Take) -> None:
     """Takes a result directory if the user names one; without it, nothing is written.
+
+    Args:
+        options: Parsed options of the command line.
+        take: Function that reserves the directory.
 
     Raises:
         InputError: Figures are wanted, and there is no directory for them.
