@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from diagrams.scenario.laws_of_kind import chosen_names
 from diagrams.scenario.loading import changed_scenario
@@ -27,6 +27,7 @@ class LawsResult(Result):
 
     runs: dict[str, RunResult]
     """Result of each run, by law."""
+    where: ClassVar[str] = "\nresults in {out}, report in {out}/report.html"
 
     def __repr__(self) -> str:
         ends = ", ".join(f"{law} {run.cause}" for law, run in self.runs.items())

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,6 +40,10 @@ class Output(ABC):
 
 class Result(Output):
     """Result of a public function, and of the command with the same name."""
+
+    where: ClassVar[str] = ""
+    """Last lines that the command prints, with ``{out}`` for the directory. Empty means
+    those of the command."""
 
     if not TYPE_CHECKING:  # type checkers report unknown attributes themselves
 

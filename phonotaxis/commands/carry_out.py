@@ -121,5 +121,6 @@ def _print(
 ) -> None:
     text = json.dumps(document, allow_nan=False) if as_json else str(result)
     if out is not None and not as_json:
-        text += f"\n{command.where.format(out=out)}"
+        where = (isinstance(result, Result) and result.where) or command.where
+        text += f"\n{where.format(out=out)}"
     print(text, flush=True)

@@ -159,7 +159,7 @@ COMMAND = Command(
     _add_arguments,
     _prepare,
     where=f"{'results':<21} {{out}}\n"
-    f"{'page':<21} {{out}}/report.html, to be opened in a browser",
+    f"{'replay':<21} {{out}}/replay.html, to be opened in a browser",
     write=_write,
     examples=(
         "simulate",
