@@ -151,9 +151,13 @@ def prepare_laws(
     def run(progress: Callable[[float], None]) -> LawsResult:
         found: dict[str, RunResult] = {}
         for number, (law, each) in enumerate(prepared.items()):
-            before = number * each.total
-            found[law] = each.run(lambda done, before=before: progress(before + done))
+            found[law] = each.run(_after(progress, number * each.total))
         return LawsResult(found)
 
     total = sum(each.total for each in prepared.values())
     return Prepared(run=run, total=total, unit="s simulated")
+
+
+def _after(progress: Callable[[float], None], before: float) -> Callable[[float], None]:
+    """Returns a progress function for work that follows earlier work."""
+    return lambda done: progress(before + done)
