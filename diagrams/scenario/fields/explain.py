@@ -166,7 +166,7 @@ def _whole_lists(found: Sequence[ErrorDetails]) -> list[ErrorDetails]:
 
 
 def _of_type(details: ErrorDetails, field: str, schema: Mapping[str, Any]) -> str:
-    """Returns the remedy for a value of a wrong type; empty for the text of pydantic."""
+    """Returns the remedy for a value of a wrong type; empty if there is none."""
     kind, given, text = details["type"], details["input"], ""
     known = next((each for each in list_fields(schema) if each.path == field), None)
     if kind == _FLAT:
