@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib.metadata import version
+from typing import Any
 
 import pytest
 
@@ -151,7 +152,7 @@ def test_the_scenario_of_a_result_begins_with_what_differs(tmp_path):
 
 
 def _tree(settings):
-    data = {}
+    data: dict[str, Any] = {}
     for path, value in settings.items():
         *parents, last = path.split(".")
         node = data

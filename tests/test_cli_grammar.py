@@ -33,7 +33,7 @@ def options_of(command: str) -> dict[str, tuple[object, ...]]:
 
 
 def test_an_option_has_one_form_in_all_commands():
-    forms = defaultdict(dict)
+    forms: dict[str, dict[str, object]] = defaultdict(dict)
     for command in COMMANDS:
         for option, form in options_of(command).items():
             forms[option][command] = form
@@ -189,7 +189,8 @@ def test_the_picture_of_several_laws(tmp_path):
         (label,) = [word for word in words if word.startswith(f"{law}: ")]
         assert run.ending in label
         (line,) = [each for each in axes.lines if each.get_label() == label]
-        np.testing.assert_allclose(line.get_xydata().T, run.vector("p_WP"))
+        drawn = np.asarray(line.get_xydata(), dtype=float).T
+        np.testing.assert_allclose(drawn, run.vector("p_WP"))
         colors.add(line.get_color())
     assert len(colors) == 2
     assert [*found["none"].figures()] == ["trajectory", "time_series"]

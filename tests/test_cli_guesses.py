@@ -51,6 +51,7 @@ def folder(tmp_path, monkeypatch) -> Path:
 def test_a_guess_at_the_prompt(capsys, folder, words):
     """It works, or one line has what to type, and nothing is written."""
     before = {path.name for path in folder.iterdir()}
+    status: int | str | None
     try:
         status = phonotaxis.main(words.split())
     except SystemExit as left:

@@ -197,8 +197,8 @@ def _find(source: str | Path) -> Path:
             f"{did_you_mean(path.stem, library)}",
         )
     hint = did_you_mean(str(source), library)
-    if path.with_suffix(".yaml").is_file():
-        hint = f" (did you mean '{path.with_suffix('.yaml')}'?)"
+    if str(source) and Path(f"{source}.yaml").is_file():
+        hint = f" (did you mean '{source}.yaml'?)"
     elif "=" in str(source):
         hint = f"; to set a field, write --set {source}"
     elif str(source) in known_laws():
