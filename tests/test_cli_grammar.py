@@ -97,8 +97,8 @@ def test_a_seed_is_refused_alike(capsys, tmp_path, monkeypatch, words):
     [
         ("--law activ", "law: 'activ' is not known"),
         ("--laws=activ", "law: 'activ' is not known"),
-        ("--set lawn=1", "lawn: is not a field"),
-        ("--set duration_s", "duration_s: is not of the form key=value"),
+        ("--set lawn=1", "lawn: did you mean 'law'?"),
+        ("--set duration_s", "duration_s: is not of the form key=value; write"),
     ],
 )
 def test_laws_and_settings_are_refused_alike(
