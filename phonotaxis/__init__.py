@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from phonotaxis.arrays import ResolutionResult, array_resolution
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
     from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
+    from phonotaxis.law_runs import LawsResult, simulate_laws
     from phonotaxis.listening import ListenResult, listen
     from phonotaxis.listings import Listing, laws, scenarios
     from phonotaxis.loops import DesignResult, StabilityResult, design, stability
@@ -50,6 +51,7 @@ __all__ = [
     "DelayResult",
     "DesignResult",
     "InputError",
+    "LawsResult",
     "LinearizedDiagram",
     "ListenResult",
     "Listing",
@@ -85,6 +87,7 @@ __all__ = [
     "margins",
     "scenarios",
     "simulate",
+    "simulate_laws",
     "stability",
     "sweep",
 ]
@@ -101,6 +104,7 @@ _HOMES = {
     "DesignResult": "phonotaxis.loops",
     "InputError": "systems.framework.input_error",
     "LinearizedDiagram": "analysis.loops.linearized_diagram",
+    "LawsResult": "phonotaxis.law_runs",
     "ListenResult": "phonotaxis.listening",
     "Listing": "phonotaxis.listings",
     "LocateResult": "phonotaxis.recordings",
@@ -133,6 +137,7 @@ _HOMES = {
     "scenarios": "phonotaxis.listings",
     "locate_delays": "phonotaxis.delays",
     "simulate": "phonotaxis.runs",
+    "simulate_laws": "phonotaxis.law_runs",
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",
 }
@@ -151,7 +156,10 @@ def __getattr__(name: str) -> Any:
     elif name in _HOMES:
         value = getattr(import_module(_HOMES[name]), name)
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from phonotaxis.other_names import of_module
+
+        hint = of_module(name, __all__)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
     globals()[name] = value
     return value
 

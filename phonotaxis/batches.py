@@ -16,7 +16,7 @@ from analysis.batches.batch import (
     prepare_comparison,
 )
 from analysis.batches.comparison_plans import EXPERIMENTS, comparison_plan
-from analysis.batches.figures import write_figures
+from analysis.batches.figures import batch_figures
 from analysis.batches.page import write_batch
 from analysis.batches.plan import SweepPlan, load_sweep
 from analysis.batches.plots import plot_cells, plot_over
@@ -99,20 +99,14 @@ class BatchResult(Result):
             raise InputError("scenario", f"{scenario!r} is not there; use {known}")
         return plot_over(chosen.plan, chosen.rows, quantity, over, by)
 
-    def save_figures(self, directory: str | Path) -> list[Path]:
-        """Writes figures as PDF, SVG and PNG files, for papers.
+    def figures(self) -> dict[str, Figure]:
+        """Draws the figures of a paper, by name.
 
         There is one figure of all cells per scenario. For each number in the grid, and
         for each drawn number, there are figures of the success rate and the collision
         rate.
-
-        Args:
-            directory: Directory, which is created if it does not exist.
-
-        Returns:
-            Paths of the files.
         """
-        return write_figures(self.batch, Path(directory))
+        return batch_figures(self.batch)
 
     def write(self, document: dict[str, Any], directory: Path) -> None:
         """Writes the page, the JSON document and the examples into ``out``.

@@ -112,6 +112,14 @@ class RunResult(diagrams.RunResult, Result):
             )
         return plot_time_series(self, Proximity(self).clearance)
 
+    def figures(self) -> dict[str, Figure]:
+        """Draws the run from above, and the time series of each robot, by name."""
+        names = {name: f"time_series_{name}" for name in self.several}
+        return {"trajectory": self.plot()} | {
+            names.get(name, "time_series"): own.plot("time_series")
+            for name, own in self.robots.items()
+        }
+
     def replay(self, path: str | Path) -> Path:
         """Writes an HTML page that replays the run in a browser, without a network.
 

@@ -11,6 +11,7 @@ import phonotaxis
 from phonotaxis import InputError
 from systems import Block
 from systems.laws.catalog import LAWS
+from tests import guesses
 
 SHORT: dict[str, Any] = {"duration_s": 0.2, "hearing": "ideal"}
 
@@ -86,7 +87,7 @@ def test_assignment_names_the_copy():
             setattr(changed, name, "active")
     with pytest.raises(AttributeError, match="lawn"):
         getattr(scenario, "law" + "n")
-    with pytest.raises(InputError, match=r"lawn: is not a field .*did you mean 'law'"):
+    with pytest.raises(InputError, match=r"lawn: did you mean 'law'"):
         scenario.with_(lawn="active")
     with pytest.raises(InputError, match="law: 'activ' is not known"):
         phonotaxis.Scenario(law="activ")
@@ -131,3 +132,29 @@ def test_laws_are_named_alike_everywhere(laws, monkeypatch):
     found.clear()
     phonotaxis.stability("default", law=laws)
     assert found
+
+
+PYTHON = guesses.NOTED_PYTHON | guesses.OWN_PYTHON
+
+
+@pytest.fixture(scope="module")
+def result() -> phonotaxis.RunResult:
+    return phonotaxis.simulate("default", SHORT, duration_s=2.0)
+
+
+@pytest.mark.parametrize("code", PYTHON)
+def test_a_guess_in_python(code, result):
+    from analysis.batches.comparison_plans import comparison_plan
+
+    names = {
+        "phonotaxis": phonotaxis,
+        "comparison_plan": comparison_plan,
+        "result": result,
+        "scenario": result.scenario,
+        "SHORT": SHORT,
+    }
+    try:
+        answer = repr(eval(code, names))
+    except (AttributeError, TypeError, InputError) as error:
+        answer = str(error)
+    assert (PYTHON[code] or "") in answer

@@ -21,15 +21,20 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from analysis.batches.conditions import Conditions
 from analysis.batches.distributions import Distribution
 from analysis.batches.sweep_file import read_sweep
+from analysis.report.file_names import distinct_names
 from diagrams.scenario.fields.explain import explain
-from diagrams.scenario.loading import resolve_sound, written_fields
+from diagrams.scenario.loading import (
+    SCENARIO_FILE,
+    resolve_sound,
+    written_fields,
+)
 from diagrams.scenario.own_code import own_files
 from diagrams.scenario.own_objects import require_file, with_names
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from diagrams.scenario.settings import apply_settings, set_fields
 from diagrams.scenario.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Parameters
+from systems.framework.parameters import Line, Parameters
 
 GridValues = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 #: Greatest number of runs. All runs are drawn and checked before the first one starts,
@@ -67,7 +72,7 @@ class SweepPlan(Parameters):
     distribution derives from the drawn number.
     """
 
-    name: str = Field(default="sweep", min_length=1, pattern=r"^[^\n]*$")
+    name: Line = Field(default="sweep", min_length=1)
     """Title of the result page."""
     scenario: str = Field(default="default", min_length=1)
     """Name of a scenario in the library, or path of a YAML file relative to
@@ -254,9 +259,11 @@ class SweepPlan(Parameters):
         The number of runs influences neither.
         """
         base = scenario_from_mapping(self.base).model_dump(mode="json")
-        document = {**self.model_dump(mode="json", exclude={"runs"}), "base": base}
-        if self.file_digests:
-            document["files"] = self.file_digests
+        # ``base`` has the contents of the scenario, wherever its file is.
+        rest = self.model_dump(mode="json", exclude={"runs", "scenario"})
+        document = {**rest, "base": base}
+        if self.named_digests:
+            document["files"] = self.named_digests
         return hashlib.sha256(json.dumps(document).encode()).hexdigest()
 
     @cached_property
@@ -288,6 +295,12 @@ class SweepPlan(Parameters):
         """Yields the texts in ``fixed`` and in the draws, with the names of fields."""
         drawn = self.model_dump(include={"draw"})["draw"]
         yield from _texts("", {**fixed, **drawn})
+
+    @property
+    def named_digests(self) -> dict[str, str]:
+        """``file_digests`` by names of files, without their folders."""
+        names = distinct_names(Path(path).name for path in self.file_digests)
+        return dict(zip(names, self.file_digests.values(), strict=True))
 
     def _draw_run(
         self, run: int, cells: list[tuple[int, dict[str, Any]]], stream: list[int]
@@ -366,9 +379,15 @@ def load_sweep(path: str | Path) -> SweepPlan:
 
 
 def dump_plan(plan: SweepPlan) -> str:
-    """Writes the plan as YAML, which ``load_sweep`` can load."""
+    """Writes the plan as YAML, which ``load_sweep`` can load.
+
+    If the scenario is a file, the plan names ``scenario.yaml``: a result directory has
+    this file beside the plan, and no path of the machine.
+    """
     document = plan.model_dump(mode="json", exclude_none=True)
-    return dump_yaml({**document, "scenario": plan.source})
+    if plan.source != plan.scenario:
+        document["scenario"] = SCENARIO_FILE
+    return dump_yaml(document)
 
 
 def _paths(key: str) -> list[str]:

@@ -81,13 +81,19 @@ def plot_trajectory(result: RunResult) -> Figure:
     return figure
 
 
-def map_axes(result: RunResult) -> tuple[Figure, Axes]:
+def map_axes(*results: RunResult, below_in: float = BELOW_IN) -> tuple[Figure, Axes]:
     """Makes a figure with axes in W, m, that show all bodies, and space for a legend.
+
+    The height of the space below the axes is ``below_in``, inch.
 
     The axes have equal scales. The height of the axes is 0.4 to 1.3 times their width;
     if necessary, they show more of the floor than the bodies need.
     """
-    x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
+    limits = np.array([bounds(result, margin=0.7) for result in results])
+    (x_low, y_low), (x_high, y_high) = (
+        limits[:, [0, 2]].min(axis=0).tolist(),
+        limits[:, [1, 3]].max(axis=0).tolist(),
+    )
     width = WIDTH_IN - LEFT_IN - RIGHT_IN
     tallest, flattest = 1.3 * width, 0.4 * width
     more = max((y_high - y_low) * width / tallest - (x_high - x_low), 0.0) / 2.0
@@ -95,10 +101,10 @@ def map_axes(result: RunResult) -> tuple[Figure, Axes]:
     more = max((x_high - x_low) * flattest / width - (y_high - y_low), 0.0) / 2.0
     y_low, y_high = y_low - more, y_high + more
     height = width * (y_high - y_low) / (x_high - x_low)
-    total = BELOW_IN + height + ABOVE_IN
+    total = below_in + height + ABOVE_IN
     figure = NotebookFigure(figsize=(WIDTH_IN, total))
     axes = figure.add_axes(
-        (LEFT_IN / WIDTH_IN, BELOW_IN / total, width / WIDTH_IN, height / total)
+        (LEFT_IN / WIDTH_IN, below_in / total, width / WIDTH_IN, height / total)
     )
     axes.set(aspect="equal", xlim=(x_low, x_high), ylim=(y_low, y_high))
     axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))

@@ -9,6 +9,13 @@ from typing import Any
 from systems.framework.input_error import InputError
 
 
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Returns the known name that is most similar to a name; empty if none is."""
+    by_folded = {each.casefold(): each for each in known}
+    near = get_close_matches(name.casefold(), by_folded, n=1)
+    return by_folded[near[0]] if near else ""
+
+
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """Returns a text that suggests similar names, for the end of an error message.
 
@@ -53,6 +60,8 @@ def unknown_law(name: str, known: Collection[str]) -> InputError:
 
     ``known`` has the names of the known laws.
     """
+    if name.endswith(".py"):
+        return InputError("", f"{name!r} is a file; name its law: {name}:NAME")
     near = did_you_mean(name, known)
     return InputError(
         "",  # the model with the field adds the path

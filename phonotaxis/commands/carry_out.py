@@ -101,10 +101,17 @@ def _written(
     if place is None:
         if result.out is not None:
             command.write(options, result, document, result.out)
+            _write_figures(options, result, result.out)
         return document, result.out
     document = {**document, "out": str(place.out)}
     command.write(options, result, document, place.directory)
+    _write_figures(options, result, place.directory)
     return document, place.out
+
+
+def _write_figures(options: Namespace, result: Result, directory: Path) -> None:
+    if getattr(options, "figures", False):
+        result.save_figures(directory / "figures")
 
 
 def _print(
@@ -117,5 +124,6 @@ def _print(
 ) -> None:
     text = json.dumps(document, allow_nan=False) if as_json else str(result)
     if out is not None and not as_json:
-        text += f"\n{command.where.format(out=out)}"
+        where = (isinstance(result, Result) and result.where) or command.where
+        text += f"\n{where.format(out=out)}"
     print(text, flush=True)

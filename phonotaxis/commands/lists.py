@@ -19,6 +19,7 @@ from phonotaxis.commands.arguments import (
     SCENARIO_WORDS,
     completed_by,
     take_json,
+    take_laws,
 )
 from phonotaxis.commands.command import Command, Printed, Take
 from phonotaxis.result import Prepared
@@ -180,33 +181,20 @@ def _add_fields_arguments(parser: ArgumentParser) -> None:
         action="store_true",
         help="print the JSON Schema, for editors and other programs",
     )
-    parser.add_argument(
-        "--law",
-        metavar="NAME",
-        help="list only the fields of a robot with this law, and the gains of your law",
-    )
+    take_laws(parser, "lists only the fields of robots with these laws")
     take_json(parser)
 
 
 def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
     from analysis.report.provenance import SCHEMA_VERSION
-    from diagrams.scenario.fields.field_list import Field, fields_of_law, find_fields
+    from diagrams.scenario.fields.field_list import find_fields
     from diagrams.scenario.fields.shipped import scenario_schema, schema_text
 
-    schema, own = scenario_schema(), list[Field]()
-    if options.law is not None and ":" in options.law:
-        from diagrams.scenario.own_gains import gain_fields
-
-        own = gain_fields(options.law)
+    schema = scenario_schema()
+    own = _own_gains(options.law or [])
     found = find_fields(schema, options.pattern, own)
-    if options.law is not None:
-        from diagrams.scenario.suggestions import unknown_law
-        from systems.laws.catalog import LAWS
-
-        if options.law not in LAWS and ":" not in options.law:
-            raise unknown_law(options.law, LAWS)
-        kind = LAWS[options.law].robot if options.law in LAWS else "follower"
-        found = fields_of_law(found, options.law, kind)
+    if options.law:
+        found = _of_laws(options.law, found)
     if options.schema:
         return _printed(schema, schema_text().rstrip("\n"))
     listed = [asdict(field) for field in found]
@@ -214,6 +202,35 @@ def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
         {"schema_version": SCHEMA_VERSION, "fields": listed},
         "\n".join(map(_paragraph, found)),
     )
+
+
+def _of_laws(given: list[str], fields: list[Field]) -> list[Field]:
+    """Returns the fields of robots that have one of the laws."""
+    from diagrams.scenario.fields.field_list import fields_of_law
+    from diagrams.scenario.suggestions import law_names, unknown_law
+    from systems.framework.input_error import InputError
+    from systems.laws.catalog import LAWS
+
+    names = law_names(given)
+    names = [*LAWS] if "all" in names else names
+    for law in names:
+        if law not in LAWS and ":" not in law:
+            raise InputError("law", unknown_law(law, LAWS).message)
+    kinds = {law: LAWS[law].robot if law in LAWS else "follower" for law in names}
+    own = [fields_of_law(fields, law, kind) for law, kind in kinds.items()]
+    return [field for field in fields if any(field in each for each in own)]
+
+
+def _own_gains(given: list[str]) -> list[Field]:
+    """Returns the gains of the user's own laws as fields."""
+    from diagrams.scenario.suggestions import law_names
+
+    laws = [law for law in law_names(given) if ":" in law] if given else []
+    if not laws:
+        return []
+    from diagrams.scenario.own_gains import gain_fields
+
+    return [field for law in laws for field in gain_fields(law)]
 
 
 def _paragraph(field: Field) -> str:
@@ -305,7 +322,7 @@ SCENARIOS = Command(
         "scenarios u_trap",
         "scenarios u_trap --copy my_scenario.yaml",
     ),
-    synonyms=("list", "show"),
+    synonyms=("list", "show", "scenario"),
 )
 LAWS = Command(
     "laws",
@@ -316,6 +333,7 @@ LAWS = Command(
         "laws",
         "laws active",
     ),
+    synonyms=("law",),
 )
 RESULTS = Command(
     "results",

@@ -12,6 +12,7 @@ from systems.framework.parameters import (
     Acceleration,
     Angle,
     Length,
+    Line,
     NonNegativeSpeed,
     Parameters,
     Size,
@@ -59,7 +60,7 @@ def check_stated_times(
 class ObstacleParameters(Parameters):
     """One box that is at rest or moves along waypoints."""
 
-    name: str = Field(default="obstacle", min_length=1)
+    name: Line = Field(default="obstacle", min_length=1)
     """Name in results and pictures."""
     size_m: Size = (0.1, 0.05)
     """Extents along the box's own x axis (its direction of travel) and y axis, m."""

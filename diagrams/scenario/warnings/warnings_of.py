@@ -12,6 +12,7 @@ from diagrams.scenario.bodies import Body
 from diagrams.scenario.participants import Router
 from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.shorthand import field_in
+from diagrams.scenario.warnings.angles import angle_warnings
 from diagrams.scenario.warnings.guarantees import assumptions
 from diagrams.scenario.warnings.route_gains import goal_warnings, route_warnings
 from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
@@ -21,15 +22,16 @@ from systems.world.plane import beyond_rectangle, control_point
 def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
     """Returns the warnings about a scenario that can still be run.
 
-    For each robot, the function warns in these cases:
+    The function warns in these cases:
 
+    - A heading in degrees looks like one in radians.
     - The scenario violates an assumption of the theorems about the robot's guard.
     - The control point P starts nearer to a known obstacle than the clearance of the
       robot's route.
     - The robot cannot come to rest with its gains, or can hit obstacles.
     - Obstacles at rest keep the robot away from its goal.
     """
-    found: list[ScenarioWarning] = []
+    found = [*angle_warnings(scenario)]
     for name, robot in scenario.robots.items():
         prefix = field_in("robots", name, "")
         if robot.own_guard is not None:
