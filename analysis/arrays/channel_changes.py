@@ -44,6 +44,10 @@ _SHARE, _STILL, _WITHIN = 0.15, 0.1, 3.0
 # Least share of the stretches that keep their delays on either side of a jump.
 _KEPT = 0.8
 
+# Error of the delay of a stretch of speech in a room, s. In addition to a quarter of the
+# jump, delays differ by this from those on their side of the jump.
+_ROOM_S = 1e-5
+
 # Least standard deviation of a delay, as a share of the sample interval.
 _FLOOR_SAMPLES = 0.05
 
@@ -178,7 +182,7 @@ def _time_of(jump: _Jump, delays: ChannelDelays) -> float | None:
     lags, times = lags[heard], delays.t_s[heard]
     middle = 0.5 * (jump.before + jump.after)[jump.across]
     side = np.sign(jump.after - jump.before)[jump.across]
-    near = 0.25 * abs(jump.step_s)
+    near = min(0.5 * abs(jump.step_s), 0.25 * abs(jump.step_s) + _ROOM_S)
     is_after = np.nanmedian((lags - middle) * side, axis=1) > 0.0
     # The best split has the most stretches on the right sides.
     wrong = np.cumsum(np.where(is_after, 1, -1))

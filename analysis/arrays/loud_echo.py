@@ -40,8 +40,8 @@ _LONGEST_S = 1.2e-3
 # Length of a window, s. It is several times as long as the latest echo.
 _WINDOW_S = 0.128
 
-# Width of the bands whose levels are made equal, Hz. An echo after more than 2 ms changes
-# the spectrum within such a band, and this change must remain.
+# Width of the bands whose levels are made equal, Hz. An echo after more than 2 ms
+# changes the spectrum within such a band, and this change must remain.
 _SMOOTH_HZ = 500.0
 
 # Highest frequency in use, and number of correlation values per period of it.
