@@ -37,6 +37,9 @@ _LEAST, _MANY = 3, 12
 # lost, and in standard deviations.
 _LEAST_SAMPLES, _DEVIATIONS = 0.7, 6.0
 
+# Jumps of fewer samples than _FEW are within _OFF_WHOLE of a whole number.
+_FEW, _OFF_WHOLE = 3.0, 0.2
+
 # Largest error of the delays that a jump explains: the smaller one of a share of the
 # jump and a share of the longest delay, in addition to standard deviations.
 _SHARE, _STILL, _WITHIN = 0.15, 0.1, 3.0
@@ -238,6 +241,9 @@ def _jump_at(split: int, delays: ChannelDelays, search: LagSearch) -> _Jump | No
         return None
     steps = np.where(first[i], change, -change)[across]
     step = float(np.median(steps))
+    samples = abs(step) * rate
+    if samples < _FEW and abs(samples - round(samples)) > _OFF_WHOLE:
+        return None
     significance = abs(step) / float(np.median(std[across]))
     alike = np.all(np.abs(steps - step) <= error[across])
     within = known & (first[i] == first[j])
