@@ -47,8 +47,8 @@ _SHARE, _STILL, _WITHIN = 0.15, 0.1, 3.0
 # Least share of the stretches that keep their delays on either side of a jump.
 _KEPT = 0.8
 
-# Error of the delay of a stretch of speech in a room, s. In addition to a quarter of the
-# jump, delays differ by this from those on their side of the jump.
+# Error of the delay of a stretch of speech in a room, s. Delays differ by this, and by
+# a quarter of the jump, from those on their side of the jump.
 _ROOM_S = 1e-5
 
 # Least standard deviation of a delay, as a share of the sample interval.
@@ -242,13 +242,12 @@ def _jump_at(split: int, delays: ChannelDelays, search: LagSearch) -> _Jump | No
     steps = np.where(first[i], change, -change)[across]
     step = float(np.median(steps))
     samples = abs(step) * rate
-    if samples < _FEW and abs(samples - round(samples)) > _OFF_WHOLE:
-        return None
+    whole = samples > _FEW or abs(samples - round(samples)) < _OFF_WHOLE
     significance = abs(step) / float(np.median(std[across]))
     alike = np.all(np.abs(steps - step) <= error[across])
     within = known & (first[i] == first[j])
     still = within.any() and np.all(stays[within])
-    if not (alike and still) or significance < _DEVIATIONS:
+    if not (alike and still and whole) or significance < _DEVIATIONS:
         return None
     # A source that moves leaves the delays of the other channels by chance only.
     chance = float(np.median((error / search.allowed_s)[within])) ** (count - 2)

@@ -50,9 +50,8 @@ _NEGATIVE = ("inverted", "directional")
 # power of such a recording that belongs to its sounds.
 _AUDIBLE, _LEAST_SHARE = 0.05, 0.02
 
-# Kinds of faults that follow from delays within the array. Longer delays, of channels
-# that are late, have higher peaks than any whole period of a tone.
-_OF_DELAYS = ("drift", "geometry", "size", "speed", "swapped", "units")
+# Kinds of faults that follow from delays.
+_OF_DELAYS = ("drift", "geometry", "size", "speed", "swapped", "unaligned", "units")
 
 # Largest number of channels in one message.
 _MOST_NAMED = 8
