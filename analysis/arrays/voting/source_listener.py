@@ -31,11 +31,11 @@ _LEAST_BINS, _FITTING_S = 30, 5.0
 
 # Factor for the error of a detection. Windows overlap, so consecutive detections have
 # similar errors.
-_OVERLAP = 1.5
+_OVERLAP = 2.0
 
 # Factor for the common error of a row's votes from 45 deg off its normal. The value is
 # from simulated rooms.
-_OF_ROWS = 4.0
+_OF_ROWS = 3.0
 
 
 class ListenerParameters(Parameters):
