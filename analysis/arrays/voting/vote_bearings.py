@@ -23,10 +23,10 @@ KERNEL_RAD = math.radians(4.5)
 #: Largest distance of the votes that are near a source, rad.
 NEAR_RAD = math.radians(12.0)
 
-# ALIKE: number of votes of single bins that count as one independent vote. Groups of
+# _ALIKE: number of votes of single bins that count as one independent vote. Groups of
 #   frames overlap, and neighboring frequencies have similar errors.
 # _INDEPENDENT: largest number of votes of one kind that count as independent.
-ALIKE, _INDEPENDENT = 9.0, 30.0
+_ALIKE, _INDEPENDENT = 9.0, 30.0
 
 #: Least standard deviation of a bearing, rad.
 LEAST_STD_RAD = math.radians(0.5)
@@ -37,7 +37,7 @@ LEAST_STD_RAD = math.radians(0.5)
 #   reflections.
 # - _DIFFERENCE: error per standard deviation between the bearings of both kinds.
 # The values are from simulated rooms with reverberation times of 0.2-0.6 s.
-_COMMON, _DIFFERENCE = 4.0, 1.2
+_COMMON, _DIFFERENCE = 3.5, 1.0
 
 _STEPS = 6
 
@@ -93,7 +93,7 @@ def voted_bearing(
     Returns:
         The bearing with its errors.
     """
-    each = ALIKE if steered is not None else 1.0
+    each = _ALIKE if steered is not None else 1.0
     first = _center(votes, start, each)
     if steered is not None:
         near = np.abs(wrapped(steered.azimuth - start)) < NEAR_RAD

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from analysis.arrays.voting.steep_votes import SteepVotes, steep_votes, without_steep
 from analysis.arrays.voting.vote_bearings import (
-    ALIKE,
     KERNEL_RAD,
     LEAST_STD_RAD,
     NEAR_RAD,
@@ -214,9 +213,7 @@ def _level_sources(
     density, centers = _density(azimuth, weight)
     if steered is not None and steered.azimuth.size:
         other, _ = _density(steered.azimuth, steered.weight)
-        single = azimuth.size / ALIKE
-        part = _OF_BINS if _OF_BINS else single / (single + steered.azimuth.size)
-        density = density**part * other ** (1.0 - part)
+        density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
     peaks = _peaks(density)
     if not peaks.size:
         return []
