@@ -37,7 +37,7 @@ LEAST_STD_RAD = math.radians(0.5)
 #   reflections.
 # - _DIFFERENCE: error per standard deviation between the bearings of both kinds.
 # The values are from simulated rooms with reverberation times of 0.2-0.6 s.
-_COMMON, _DIFFERENCE = 4.0, 1.2
+_COMMON, _DIFFERENCE = 3.5, 1.0
 
 _STEPS = 6
 
