@@ -31,7 +31,7 @@ _LEAST_BINS, _FITTING_S = 30, 5.0
 
 # Factor for the error of a detection. Windows overlap, so consecutive detections have
 # similar errors.
-_OVERLAP = 2.0
+_OVERLAP = 1.5
 
 # Factor for the common error of a row's votes from 45 deg off its normal. The value is
 # from simulated rooms.
