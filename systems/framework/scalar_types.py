@@ -28,19 +28,26 @@ class _Template(TemplateSystem):
 
     def _on_add(self, param: Any, cls: type, skip_rename: Any) -> Any:
         if "_construct_copy" not in vars(cls):
-            _make_copyable(cls)
+            _make_copyable(cls, self.name)
         theirs = vars(scalar_conversion)
         searching = theirs["TemplateMethod"]
         theirs["TemplateMethod"] = functools.partial(searching, scope=scalar_conversion)
         try:
-            return super()._on_add(param, cls, skip_rename)
+            added = super()._on_add(param, cls, skip_rename)
         finally:
             theirs["TemplateMethod"] = searching
+        # Drake's constructor takes any arguments, and passes them to ``_construct``.
+        if "__signature__" in vars(cls):
+            self.__signature__ = cls.__signature__
+            vars(cls)["__init__"].__signature__ = inspect.signature(cls._construct)
+        return added
 
 
-def _make_copyable(cls: Any) -> None:
+def _make_copyable(cls: Any, name: str) -> None:
     """Defines copies for another scalar type, with the arguments of the original."""
     construct = cls._construct
+    # Errors about arguments then name the block.
+    inspect.unwrap(construct).__qualname__ = name.rpartition(".")[2].removesuffix("_")
 
     @functools.wraps(construct)
     def construct_and_remember(

@@ -1,0 +1,21 @@
+"""Functions that test blocks: yours, those of phonotaxis, and other Drake systems.
+
+- ``evaluate`` evaluates the outputs of a block once.
+- ``run`` simulates a block over time.
+- ``Bench`` holds a block whose inputs, state and time a test changes step by step.
+- ``assert_linearization`` compares derivatives with finite differences.
+- ``drive`` runs a scenario in which signals of the test replace signals of the robot.
+
+The fixtures in ``phonotaxis.pytest_plugin`` use these functions.
+"""
+
+from phonotaxis.testing.bench import Bench as Bench
+from phonotaxis.testing.driving import drive as drive
+from phonotaxis.testing.evaluation import (
+    History as History,
+    evaluate as evaluate,
+    run as run,
+)
+from phonotaxis.testing.linearization import (
+    assert_linearization as assert_linearization,
+)
