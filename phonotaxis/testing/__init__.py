@@ -6,7 +6,7 @@
 - ``assert_linearization`` compares derivatives with finite differences.
 - ``drive`` runs a scenario in which signals of the test replace signals of the robot.
 
-The fixtures in ``phonotaxis.pytest_plugin`` use these functions.
+The pytest plugin ``phonotaxis_pytest`` has fixtures for tests of blocks.
 """
 
 from phonotaxis.testing.bench import Bench as Bench

@@ -249,7 +249,7 @@ class Bench:
 
     @property
     def _is_tuple(self) -> bool:
-        """Whether the state is a named tuple, which ``Block`` keeps in Drake's state."""
+        """Whether the state of the block is a named tuple."""
         return has_arrays(getattr(getattr(self.block, "step", None), "state", None))
 
     def _continuous(self) -> NDArray[Any]:

@@ -29,8 +29,8 @@ def drive(
     and the table of the run contains the signal. Each signal is constant during a tick
     (control period). The run uses Drake's engine.
 
-    Example: ``drive("wall", {"target_valid": lambda t: t < 2.0}, hearing="ideal")`` runs
-    a robot that does not hear the source any more after 2 s.
+    Example: ``drive("wall", {"target_valid": lambda t: t < 2.0})`` runs a robot that
+    does not know the source any more after 2 s.
 
     Args:
         scenario: A scenario, the name of a scenario, or the path of a YAML file.

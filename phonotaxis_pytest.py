@@ -1,8 +1,8 @@
 """pytest fixtures for tests of blocks, laws and scenarios.
 
-pytest loads this plugin in every environment in which phonotaxis is installed. The
-plugin itself imports nothing but pytest. Each fixture loads phonotaxis when a test uses
-it.
+pytest loads this plugin in every environment in which phonotaxis is installed, also for
+tests of other software. Therefore the module is no part of the package ``phonotaxis``,
+and imports nothing but pytest. A fixture loads phonotaxis when a test uses it.
 """
 
 from __future__ import annotations
