@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from analysis.runs.columns import columns
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
+    from phonotaxis import testing as testing
     from phonotaxis.arrays import ResolutionResult, array_resolution
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
     from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
@@ -127,6 +128,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         value = version("phonotaxis")
+    elif name == "testing":
+        value = import_module("phonotaxis.testing")
     elif name in _HOMES:
         value = getattr(import_module(_HOMES[name]), name)
     else:

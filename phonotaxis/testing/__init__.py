@@ -9,13 +9,9 @@
 The pytest plugin ``phonotaxis_pytest`` has fixtures for tests of blocks.
 """
 
-from phonotaxis.testing.bench import Bench as Bench
-from phonotaxis.testing.driving import drive as drive
-from phonotaxis.testing.evaluation import (
-    History as History,
-    evaluate as evaluate,
-    run as run,
-)
-from phonotaxis.testing.linearization import (
-    assert_linearization as assert_linearization,
-)
+from phonotaxis.testing.bench import Bench
+from phonotaxis.testing.driving import drive
+from phonotaxis.testing.evaluation import History, evaluate, run
+from phonotaxis.testing.linearization import assert_linearization
+
+__all__ = ["Bench", "History", "assert_linearization", "drive", "evaluate", "run"]

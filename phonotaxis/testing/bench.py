@@ -11,7 +11,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
-from pydrake.common.value import Value
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator_, SimulatorConfig
 
 from phonotaxis.testing.ports import (
@@ -269,8 +268,7 @@ class Bench:
                 f"{type(step.state).__name__}; write state=block.step.state",
             )
         # The update of no tick has been done, and its outputs are not known.
-        value = Value((-1, copied(state), None))
-        self.context.SetAbstractState(0, value)
+        self.context.SetAbstractState(0, (-1, copied(state), None))
         if step.publish is not None:
             ports = filter(carries_numbers, output_ports(self.block))
             published = [np.zeros(port.size()) for port in ports]

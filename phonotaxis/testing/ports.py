@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
-from pydrake.common.value import AbstractValue, Value
+from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import PortDataType, System_
 
 from diagrams.scenario.suggestions import did_you_mean
 from systems.framework.finite import block_name
 from systems.framework.input_error import InputError, shortened
 
+_DUAL = System_[AutoDiffXd]
 # Longest list of zeros that a message shows.
 _MOST_ZEROS = 9
 
@@ -66,7 +67,7 @@ def carries_numbers(port: Any) -> bool:
 
 def differentiates(block: Any) -> bool:
     """Whether the numbers of a block are AutoDiffXd."""
-    return isinstance(block, System_[AutoDiffXd])
+    return isinstance(block, _DUAL)
 
 
 def numbers_of(block: Any, values: Any) -> Any:
@@ -102,7 +103,7 @@ def port_value(block: Any, port: Any, value: Any) -> Any:
         InputError: The value is not numeric, or its shape is not that of the port.
     """
     if not carries_numbers(port):
-        return value if isinstance(value, AbstractValue) else Value(value)
+        return _object_value(block, port, value)
     try:
         numbers = np.atleast_1d(numbers_of(block, value))
     except (TypeError, ValueError):
@@ -115,6 +116,22 @@ def port_value(block: Any, port: Any, value: Any) -> Any:
             fault = f"has the shape {numbers.shape}"
         raise _wrong(block, port, fault)
     return numbers
+
+
+def _object_value(block: Any, port: Any, value: Any) -> AbstractValue:
+    if isinstance(value, AbstractValue):
+        return value
+    carried: Any = port.Allocate()
+    try:
+        carried.set_value(value)
+    except TypeError:
+        kind = type(carried.get_value()).__name__
+        raise InputError(
+            block_name(block),
+            f"{port.get_name()} is {shortened(repr(value), 60)}; it needs an object of "
+            f"the class {kind}; write {port.get_name()}={kind}(...)",
+        ) from None
+    return carried
 
 
 def _wrong(block: Any, port: Any, fault: str) -> InputError:
