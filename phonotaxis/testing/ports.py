@@ -32,6 +32,13 @@ def output_ports(block: Any) -> list[Any]:
 def input_port(block: Any, name: str) -> Any:
     """Returns the input port with a name.
 
+    Args:
+        block: Any Drake system.
+        name: Name of the port.
+
+    Returns:
+        The port.
+
     Raises:
         InputError: The block has no input port of this name.
     """
@@ -42,6 +49,13 @@ def input_port(block: Any, name: str) -> Any:
 
 def output_port(block: Any, name: str) -> Any:
     """Returns the output port with a name.
+
+    Args:
+        block: Any Drake system.
+        name: Name of the port.
+
+    Returns:
+        The port.
 
     Raises:
         InputError: The block has no output port of this name.
@@ -71,7 +85,14 @@ def differentiates(block: Any) -> bool:
 
 
 def numbers_of(block: Any, values: Any) -> Any:
-    """Returns an array of the numbers in ``values``, of the scalar type of a block.
+    """Returns an array of numbers, of the scalar type of a block.
+
+    Args:
+        block: Any Drake system.
+        values: Number, or sequence of numbers, floats or AutoDiffXd.
+
+    Returns:
+        An array of the shape of ``values``.
 
     Raises:
         ValueError: The values are not numbers, or their lists differ in length.

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from systems.framework.input_error import InputError, shortened
 from systems.framework.parameters import Parameters
 
-_PLAIN = bool | int | float | str | list | tuple | set
+_PLAIN = (bool, int, float, str, list, tuple, set)
 
 
 def with_checked_parameters(construct: Callable[..., None]) -> Callable[..., None]:
@@ -38,7 +38,7 @@ def with_checked_parameters(construct: Callable[..., None]) -> Callable[..., Non
     def construct_checked(self: Any, *arguments: Any, **options: Any) -> None:
         for name in models.keys() & options.keys():
             value, model = options[name], models[name]
-            if isinstance(value, Mapping | _PLAIN):
+            if isinstance(value, (Mapping, *_PLAIN)):
                 options[name] = _validated(name, model, value)
         construct(self, *arguments, **options)
 

@@ -26,7 +26,7 @@ class _Template(TemplateSystem):
         super().__init__(name, scalars, pairs, scope)
         self.__module__ = scope.__name__
 
-    def _on_add(self, param: Any, cls: type, skip_rename: Any) -> Any:
+    def _on_add(self, param: Any, cls: Any, skip_rename: Any) -> Any:
         if "_construct_copy" not in vars(cls):
             _make_copyable(cls, self.name)
         theirs = vars(scalar_conversion)
@@ -38,8 +38,10 @@ class _Template(TemplateSystem):
             theirs["TemplateMethod"] = searching
         # Drake's constructor takes any arguments, and passes them to ``_construct``.
         if "__signature__" in vars(cls):
-            self.__signature__ = cls.__signature__
-            vars(cls)["__init__"].__signature__ = inspect.signature(cls._construct)
+            self.__signature__ = shown = cls.__signature__
+            own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+            parameters = [own, *shown.parameters.values()]
+            vars(cls)["__init__"].__signature__ = shown.replace(parameters=parameters)
         return added
 
 
