@@ -412,7 +412,7 @@ def connect_by_name(
     builder: DiagramBuilder,
     blocks: Sequence[Any],
     outside: Sequence[str] = (),
-    given: Sequence[Any] = (),
+    replacing: Sequence[Any] = (),
 ) -> None:
     """Connects each input port of the blocks to the only output port of the same name.
 
@@ -425,7 +425,7 @@ def connect_by_name(
         outside: Names of quantities that become inputs of the diagram. The name
             ``emission``, for example, also selects all inputs whose names begin with
             ``emission_``.
-        given: Blocks whose outputs replace other outputs of the same name.
+        replacing: Blocks whose outputs replace other outputs of the same name.
 
     Raises:
         InputError: Several blocks publish a quantity that a block needs.
@@ -438,7 +438,7 @@ def connect_by_name(
             port = block.get_output_port(index)
             outputs[port.get_name()] = port
             counts[port.get_name()] += 1
-    for block in given:
+    for block in replacing:
         port = block.get_output_port(0)
         outputs[port.get_name()], counts[port.get_name()] = port, 1
     entries: dict[str, Any] = {}

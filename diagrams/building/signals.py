@@ -33,7 +33,8 @@ class SignalSource(Block):
     def __init__(self, port: Port, signal: Signal, tick_s: float) -> None:
         super().__init__()
         self.set_name(f"signal_{port.name}")
-        self.part, self.outputs = self.get_name(), (port,)
+        named: Any = self  # other blocks state their part in the class
+        named.part, self.outputs = self.get_name(), (port,)
         self.declare_ports()
 
         def calc(context: Any, output: Any) -> None:

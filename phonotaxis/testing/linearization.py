@@ -102,7 +102,7 @@ def assert_linearization(
                 f"{block_name(block)}: {what} is {derivatives[row, column]:.9g} by "
                 f"{source}, and {difference.central[row]:.9g} by central differences "
                 f"(step {difference.step:.2g}, tolerance {allowed[row]:.2g})"
-                f"{difference.remark(row)}"
+                f"{difference.remark(int(row))}"
             )
 
 
@@ -223,8 +223,8 @@ def _automatic(point: _Point, varied: list[int]) -> NDArray[np.float64]:
 
 
 def _derivatives(value: AutoDiffXd, count: int) -> NDArray[np.float64]:
-    found = value.derivatives()
-    return found if len(found) else np.zeros(count)
+    found = np.asarray(value.derivatives(), dtype=float)
+    return found if found.size else np.zeros(count)
 
 
 def _matrix(point: _Point, model: Any) -> NDArray[np.float64]:
