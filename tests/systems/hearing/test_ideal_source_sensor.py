@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,10 @@ place = st.floats(-5.0, 5.0)
 angle = st.floats(-3.0, 3.0)
 
 #: P at (1, 1.175), facing north; the source 2 m ahead and 1 m to the left.
-POSES = {"pose_WB": [1.0, 1.0, math.pi / 2], "pose_WS": [0.0, 3.175, 0.3]}
+POSES: dict[str, Any] = {
+    "pose_WB": [1.0, 1.0, math.pi / 2],
+    "pose_WS": [0.0, 3.175, 0.3],
+}
 
 
 def test_position_bearing_and_range_a_tick_later():
@@ -41,7 +45,7 @@ def test_present_poses_do_not_show_before_the_tick():
 
 
 def test_tells_front_from_back():
-    poses = {"pose_WB": [0, 0, 0], "pose_WS": [-1.825, 0.5, 0]}
+    poses: dict[str, Any] = {"pose_WB": [0, 0, 0], "pose_WS": [-1.825, 0.5, 0]}
     at = Bench(IdealSourceSensor(always=True), **poses).tick()
     np.testing.assert_allclose(at.output("p_PS_B"), [-2.0, 0.5], atol=1e-12)
     assert abs(at.output("source_bearing")[0]) > math.pi / 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ place = st.floats(-2.0, 2.0)
 angle = st.floats(-3.0, 3.0)
 
 
-def scene(pose_WB=(0.0, 0.0, 0.0)) -> dict[str, object]:
+def scene(pose_WB=(0.0, 0.0, 0.0)) -> dict[str, Any]:
     """Two boxes: 1 m to P's left (a face), and ahead right (a corner)."""
     return {
         "pose_WB": pose_WB,

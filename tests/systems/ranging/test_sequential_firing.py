@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,7 +45,11 @@ def approach(
     sensors = UltrasonicParameters.model_validate(
         {"noise_m": 0.0, "firing": firing, "period_s": period}
     )
-    far = {"poses_WO": [0.0] * 3, "sizes": [1.0, 30.0], "pose_WS": [90.0, 0.0, 0.0]}
+    far: dict[str, Any] = {
+        "poses_WO": [0.0] * 3,
+        "sizes": [1.0, 30.0],
+        "pose_WS": [90.0, 0.0, 0.0],
+    }
     array = Bench(
         UltrasonicArray(parameters=sensors, obstacle_count=1),
         pose_WB=[0.0] * 3,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ def make_array(parameters=QUIET, **settings) -> UltrasonicArray:
     return UltrasonicArray(parameters=parameters, obstacle_count=1, **settings)
 
 
-def wall_ahead(distance: float, *, pose_WB=(0.0, 0.0, 0.0)) -> dict[str, object]:
+def wall_ahead(distance: float, *, pose_WB=(0.0, 0.0, 0.0)) -> dict[str, Any]:
     """Inputs for a long wall at a distance ahead of P."""
     x, y, theta = pose_WB
     ahead = 0.175 + distance + 0.5

@@ -130,13 +130,13 @@ def test_called_on_it_plays_from_that_tick_as_one_that_starts_then():
     late = SoundParameters(on_s=0.2, period_s=0.4, start_s=0.1)
     emissions: dict[str, Any] = {}
     for name, own, called in (("called", sound, True), ("clock", late, False)):
-        calls = {"calling": lambda t: float(t > 0.09)} if called else {}
+        calls: dict[str, Any] = {"calling": lambda t: float(t > 0.09)}
         history = run(
             SoundEmitter(sound=own, called=called),
             0.275,
             pose_WS=[0.0] * 3,
             v_WS=[0.0] * 3,
-            **calls,
+            **(calls if called else {}),
         )
         assert not called or not history["emission"][3].sounding
         emissions[name] = history["emission"][-1]

@@ -26,13 +26,13 @@ pytestmark = pytest.mark.drake
 PLAIN = TrackerParameters(hold="world")
 #: As for ideal hearing: every source is where it is heard.
 EXACT: Any = {"resolve_front_back": False, "floor_m": 0.0}
-SILENT = {
+SILENT: dict[str, Any] = {
     "p_PS_B": [0.0, 0.0],
     "covariance": [0.0] * 4,
     "detected": [0.0],
     "range_valid": [0.0],
 }
-HEARD = {
+HEARD: dict[str, Any] = {
     "p_PS_B": [2.0, 1.0],
     "covariance": [0.04, 0.01, 0.01, 0.09],
     "detected": [1.0],
