@@ -36,7 +36,7 @@ def quick_scenario() -> Callable[..., Scenario]:
     from phonotaxis import load_scenario
 
     def make(name: str = "default", /, **fields: Any) -> Scenario:
-        quick = {"duration_s": 2.0}
+        quick: dict[str, Any] = {"duration_s": 2.0}
         scenario = load_scenario(name)
         if any(robot.listens for robot in scenario.robots.values()):
             quick["hearing"] = "ideal"

@@ -20,9 +20,10 @@ from systems import CollisionVector, DiffDrivePlant, WheelCommand
 from systems.framework.block import Block, Block_, Port, Step
 from systems.framework.scalar_types import define_for_scalars
 
-A = np.array([[0.0, 1.0], [-4.0, -0.4]])
-B = np.array([[0.0], [1.0]])
-C, D = np.array([[1.0, 0.0], [0.3, 0.2]]), np.array([[0.0], [0.5]])
+A: Any = np.array([[0.0, 1.0], [-4.0, -0.4]])
+B: Any = np.array([[0.0], [1.0]])
+C: Any = np.array([[1.0, 0.0], [0.3, 0.2]])
+D: Any = np.array([[0.0], [0.5]])
 
 
 class Counts(NamedTuple):
@@ -64,8 +65,8 @@ class Plain(LeafSystem):
         output.SetAtIndex(0, context.get_time())
 
     def _length(self, context, output):
-        word = self.GetInputPort("word").Eval(context)
-        u = self.GetInputPort("u").Eval(context)
+        word: Any = self.GetInputPort("word").Eval(context)
+        u: Any = self.GetInputPort("u").Eval(context)
         output.SetAtIndex(0, len(word) * float(np.hypot(*u)))
 
 
@@ -82,7 +83,7 @@ def slip(tick, state, inputs, outputs, numbers):
 
 @define_for_scalars("Square_", __name__)
 def Square_(T):
-    class Impl(Block_[T]):
+    class Impl(Block_[T]):  # type: ignore[valid-type,misc]
         """The square of a number, and the magnitude of another number."""
 
         inputs = (Port("x", 2, "m"),)
@@ -200,10 +201,11 @@ def test_a_diagram_is_a_block_too():
     builder.ExportInput(gain.get_input_port(), "in")
     builder.ExportOutput(whole.get_output_port(), "out")
     diagram = builder.Build()
-    history = run(diagram, 1.0, **{"in": 2.0})
+    inputs: dict[str, Any] = {"in": 2.0}
+    history = run(diagram, 1.0, **inputs)
     assert history["out"][-1] == pytest.approx([6.0])
-    assert_linearization(diagram, **{"in": 2.0}, model=control.ss(0.0, 3.0, 1.0, 0.0))
-    assert_linearization(diagram, **{"in": 2.0})
+    assert_linearization(diagram, **inputs, model=control.ss(0.0, 3.0, 1.0, 0.0))
+    assert_linearization(diagram, **inputs)
 
 
 def test_right_derivatives_pass_and_wrong_ones_are_named():
@@ -234,7 +236,7 @@ def test_a_linear_model_is_compared_with_the_block():
         assert_linearization(Counter(), step=1.0)
 
 
-QUICK = {"hearing": "ideal", "duration_s": 1.0}
+QUICK: dict[str, Any] = {"hearing": "ideal", "duration_s": 1.0}
 
 
 def test_a_driven_quantity_reaches_the_blocks_and_the_table():
@@ -244,9 +246,9 @@ def test_a_driven_quantity_reaches_the_blocks_and_the_table():
     assert found["v_WP_x"][19] == pytest.approx(0.2 * 0.5)
     assert found["v_WP_x"].iloc[-1] == pytest.approx(0.2 * 0.5)
     plain = phonotaxis.simulate("obstacle_free", **QUICK)
-    found = drive("obstacle_free", {"p_PS_B": [2.0, 0.5]}, **QUICK)
-    assert [*found.columns] == [*plain.columns]
-    assert set(found.columns["p_PS_B_y"]) == {0.5}
+    placed = drive("obstacle_free", {"p_PS_B": [2.0, 0.5]}, **QUICK)
+    assert [*placed.columns] == [*plain.columns]
+    np.testing.assert_array_equal(placed.columns["p_PS_B_y"], 0.5)
     kept = {"p_WS_estimated": lambda t: [2.0, 0.0]}
     bearing = drive("obstacle_free", kept, **QUICK).columns["source_bearing_true"]
     np.testing.assert_array_equal(bearing[0], plain.columns["source_bearing_true"][0])

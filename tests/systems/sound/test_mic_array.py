@@ -215,7 +215,9 @@ def test_frame_starts_from_the_pose_of_the_last_tick():
         pose_WB=[0.0] * 3,
         velocity_WB=[0.0] * 3,
     )
-    audio = at.tick().set(pose_WB=[0.003, 0.0, 0.0]).output("audio")
+    at.state = at.next_state()
+    at.context.SetTime(TIME)
+    audio = at.set(pose_WB=[0.003, 0.0, 0.0]).output("audio")
     assert isinstance(audio, AudioFrame)
     counts = audio.counts[1]
     s = np.arange(2500) / 2500
@@ -236,7 +238,8 @@ def test_a_pose_of_an_older_tick_is_no_start_of_a_frame():
         pose_WB=[-0.05, 0.0, 0.0],
         velocity_WB=[0.0] * 3,
     )
-    at.tick().context.SetTime(TIME)
+    at.state = at.next_state()
+    at.context.SetTime(TIME)
     audio = at.set(pose_WB=[0.0] * 3).output("audio")
     phases, _ = phase_and_amplitude(audio.counts)
     expected = np.exp(-2j * np.pi * TONE * (3.0 - 0.175) / 340.0)
