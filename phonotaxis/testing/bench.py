@@ -30,12 +30,6 @@ from systems.framework.finite import block_name
 from systems.framework.input_error import InputError, shortened
 from systems.framework.signals import TICK_S
 
-_INTEGRATION = SimulatorConfig(
-    integration_scheme="runge_kutta5",
-    max_step_size=TICK_S,
-    accuracy=1e-7,
-    use_error_control=True,
-)
 _ROUNDING_S = 1e-9
 
 
@@ -231,7 +225,14 @@ class Bench:
         self.set(**inputs)
         if self._simulator is None:
             self._simulator = Simulator_[self._scalar](self.block, self.context)
-            ApplySimulatorConfig(_INTEGRATION, self._simulator)
+            config = SimulatorConfig(
+                integration_scheme="runge_kutta5",
+                max_step_size=self.tick_s,
+                accuracy=1e-7,
+                use_error_control=True,
+                start_time=self.time_s,  # Drake sets the time to this value
+            )
+            ApplySimulatorConfig(config, self._simulator)
         if self._simulated_s != self.time_s:
             self._simulator.Initialize()
         end = self.time_s + self.tick_s
