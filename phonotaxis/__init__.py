@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from analysis.views.live_view import add_live_view
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
+    from phonotaxis import testing as testing
     from phonotaxis.arrays import ResolutionResult, array_resolution
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
     from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
@@ -153,6 +154,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         value = version("phonotaxis")
+    elif name == "testing":
+        value = import_module("phonotaxis.testing")
     elif name in _HOMES:
         value = getattr(import_module(_HOMES[name]), name)
     else:

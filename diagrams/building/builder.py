@@ -20,6 +20,7 @@ from diagrams.building.robot import (
     multiplexed,
     parts_of,
 )
+from diagrams.building.signals import Signal
 from diagrams.scenario.scenario import ODOR, WORLD, Scenario
 from systems import Obstacles
 from systems.framework.input_error import InputError
@@ -95,7 +96,12 @@ class SoundFollower:
         return self.blocks[part].GetOutputPort(name)
 
 
-def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollower:
+def build_sound_follower(
+    scenario: Scenario,
+    *,
+    log: bool = False,
+    signals: Mapping[str, Mapping[str, Signal]] | None = None,
+) -> SoundFollower:
     """Builds the diagram of a scenario with all its robots, sources and obstacles.
 
     Each robot and each source is a diagram inside this diagram (``make_robot``,
@@ -110,6 +116,9 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     Args:
         scenario: The scenario to build.
         log: Whether each robot logs the columns of its blocks.
+        signals: Signals that replace quantities of a robot, by name of the robot and
+            then by name of the quantity. A signal is a function of the time in s. All
+            blocks of the robot then read the signal instead of the quantity.
 
     Returns:
         The diagram, with the blocks of each robot and source.
@@ -117,7 +126,9 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     Raises:
         InputError: The law is not known.
         InputError: A sound file cannot be played.
+        InputError: No block of the robot reads a quantity in ``signals``.
     """
+    driven = signals or {}
     builder = DiagramBuilder()
     audible = audible_sounds(scenario)
     sources = {
@@ -125,7 +136,10 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
         for name, source in scenario.sources.items()
     }
     obstacles = Obstacles(obstacles=scenario.obstacles)
-    followers = {name: robot_of(scenario, name, log=log) for name in scenario.robots}
+    followers = {
+        name: robot_of(scenario, name, log=log, signals=driven.get(name))
+        for name in scenario.robots
+    }
     systems = [*sources.items(), ("obstacles", obstacles), *followers.items()]
     shared = make_world(scenario, log=log)
     if shared is not None:
@@ -170,7 +184,13 @@ def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
     return scenario.sounds() if listens else {}
 
 
-def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
+def robot_of(
+    scenario: Scenario,
+    name: str,
+    *,
+    log: bool = False,
+    signals: Mapping[str, Signal] | None = None,
+) -> Diagram:
     """Builds the diagram of one robot of a scenario with ``make_robot``.
 
     If no robot hears the robot's loudspeaker, the diagram has no loudspeaker.
@@ -180,6 +200,7 @@ def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
         name: Name of the robot.
         log: Whether the diagram logs the columns of its blocks at every tick (control
             period).
+        signals: Signals that replace quantities of the robot, see ``make_robot``.
 
     Returns:
         The diagram, see ``make_robot``.
@@ -195,6 +216,7 @@ def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
         others=[each for each in scenario.sounds() if each != target],
         listeners_frame_s=scenario.longest_frame_s,
         log=log,
+        signals=signals,
     )
 
 

@@ -18,6 +18,7 @@ from diagrams.building.own_blocks import with_own_blocks
 from diagrams.building.robots.following_robot import following_blocks
 from diagrams.building.robots.routed_robot import routed_blocks, trajectory_command
 from diagrams.building.robots.searching_robot import search_command, searching_blocks
+from diagrams.building.signals import Signal, signal_sources
 from diagrams.building.world_blocks import world_blocks
 from diagrams.scenario.participants import Follower, Router, SourceParameters
 from diagrams.scenario.scenario import WORLD, Scenario
@@ -220,6 +221,7 @@ def make_robot(
     others: Sequence[str] = (),
     listeners_frame_s: float = TICK_S,
     log: bool = False,
+    signals: Mapping[str, Signal] | None = None,
 ) -> Diagram:
     """Builds the diagram of a robot.
 
@@ -251,6 +253,8 @@ def make_robot(
             s.
         log: Whether the diagram logs the columns of its blocks at every tick (control
             period).
+        signals: Signals that replace quantities of the robot, by name of the quantity,
+            see ``signal_sources``.
 
     Returns:
         The diagram. ``parts_of`` returns its blocks by part (role of the block).
@@ -260,10 +264,13 @@ def make_robot(
     """
     by_part = robot_blocks(scenario, name, bodies=bodies, robots=robots, others=others)
     blocks, plant = [*by_part.values()], by_part["plant"]
+    given = signal_sources(blocks, signals or {}, scenario.tick_s)
+    # The log keeps the last of several columns of the same name, that of the signal.
+    blocks += given
     builder = DiagramBuilder()
     for block in blocks:
         builder.AddNamedSystem(block.get_name(), block)
-    connect_by_name(builder, blocks, OUTSIDE)
+    connect_by_name(builder, blocks, OUTSIDE, given)
     for port in ("pose_WB", "velocity_WB"):
         builder.ExportOutput(plant.GetOutputPort(port), port)
     for port in SHOWN:
@@ -411,7 +418,10 @@ def _driving(scenario: Scenario, controller: Any) -> Any:
 
 
 def connect_by_name(
-    builder: DiagramBuilder, blocks: Sequence[Any], outside: Sequence[str] = ()
+    builder: DiagramBuilder,
+    blocks: Sequence[Any],
+    outside: Sequence[str] = (),
+    replacing: Sequence[Any] = (),
 ) -> None:
     """Connects each input port of the blocks to the only output port of the same name.
 
@@ -424,6 +434,7 @@ def connect_by_name(
         outside: Names of quantities that become inputs of the diagram. The name
             ``emission``, for example, also selects all inputs whose names begin with
             ``emission_``.
+        replacing: Blocks whose outputs replace other outputs of the same name.
 
     Raises:
         InputError: Several blocks publish a quantity that a block needs.
@@ -436,6 +447,9 @@ def connect_by_name(
             port = block.get_output_port(index)
             outputs[port.get_name()] = port
             counts[port.get_name()] += 1
+    for block in replacing:
+        port = block.get_output_port(0)
+        outputs[port.get_name()], counts[port.get_name()] = port, 1
     entries: dict[str, Any] = {}
     for block in blocks:
         for index in range(block.num_input_ports()):

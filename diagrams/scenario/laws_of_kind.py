@@ -16,8 +16,8 @@ def chosen_names(laws: Laws, scenario: Scenario) -> list[str]:
     """Returns the names of laws that a user has given for a scenario, each once.
 
     Args:
-        laws: Names, or functions and classes, as in ``law_names``. ``all`` means every law for
-            robots of this kind, except ``none``.
+        laws: Names, or functions and classes, as in ``law_names``. ``all`` means every
+            law for robots of this kind, except ``none``.
         scenario: The scenario.
 
     Returns:

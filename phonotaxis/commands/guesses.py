@@ -51,7 +51,7 @@ _NO_COMMANDS = {
     **dict.fromkeys(("delete", "clean", "remove", "rm"), _PLAIN),
     **dict.fromkeys(("test", "demo", "quickstart"), _FIRST),
     **dict.fromkeys(("install", "update", "upgrade"), _PIP),
-    "live": "use 'phonotaxis simulate --live' to watch a run, or 'phonotaxis listen' for sound",
+    "live": "use 'phonotaxis simulate --live' for a run, or 'phonotaxis listen'",
     "ls": "use 'phonotaxis results' or 'phonotaxis scenarios'",
     "log": "use 'phonotaxis results', which lists what is there",
     "example": "'phonotaxis COMMAND --help' ends with examples",

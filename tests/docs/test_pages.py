@@ -19,6 +19,7 @@ PAGES = (
     "your_scenario.md",
     "your_law.md",
     "extending.md",
+    "test_your_block.md",
     "stability_report.md",
     "your_recording.md",
     "your_diagram.md",

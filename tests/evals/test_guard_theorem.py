@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.safety.driver_trials import draw_trial, make_trial, run_trial
 from diagrams import Scenario, load_scenario, simulate
+from phonotaxis.testing import Bench
 from studies.support.crossing_trials import contact_speeds, draw_crossing
 from systems.base.diff_drive_plant import DiffDrivePlant, body_twist
 from systems.base.lagged_motion import advance_pose, lagged_motion
@@ -236,11 +237,8 @@ def test_a4_what_is_forgotten_beside_it_is_not_driven_into():
 def braking_way(friction: float | None, speed: float = 0.72) -> float:
     """Way to rest, m, of the plant's own equations in steps of 1 ms."""
     plant = PlantParameters(friction=friction)
-    block = DiffDrivePlant(plant=plant)
-    context = block.CreateDefaultContext()
-    port = block.GetInputPort("wheel_speeds")
-    port.FixValue(context, [0.0, 0.0])
-    state = np.zeros(context.num_continuous_states())
+    at = Bench(DiffDrivePlant(plant=plant))
+    state = np.zeros(len(at.state))
     state[5:7] = speed / 0.06
     if friction is not None:
         state[7] = speed
@@ -248,10 +246,10 @@ def braking_way(friction: float | None, speed: float = 0.72) -> float:
     commanded: Any = (speed / 0.06,) * 2
     for _ in range(120):
         commanded = braked(commanded, braking)
-        port.FixValue(context, list(commanded))
+        at.set(wheel_speeds=commanded)
         for _ in range(25):
-            context.SetContinuousState(state)
-            state = state + 1e-3 * block.EvalTimeDerivatives(context).CopyToVector()
+            at.state = state
+            state = state + 1e-3 * at.rates()
     return float(state[0])
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from diagrams import dump_scenario, load_scenario, simulate
 from diagrams.scenario.warnings.guarantees import guarantees
+from phonotaxis.testing import Bench
 from systems import FreeSpaceMap, SensingMonitor, UltrasonicArray
 from systems.framework.input_error import InputError
 from systems.ranging.parameters import RangeSensorParameters, UltrasonicParameters
@@ -124,10 +125,10 @@ def test_each_cone_has_its_own_width():
     assert found[1] == pytest.approx(0.79, abs=1e-9)
 
 
-def test_each_sensor_has_its_own_noise_and_limits(bench):
+def test_each_sensor_has_its_own_noise_and_limits():
     """Closed forms: a wall 0.5 m ahead, and standard deviations of 1, 1 and 20 mm."""
     block = UltrasonicArray(parameters=KINDS, obstacle_count=1, seed=3)
-    at = bench(
+    at = Bench(
         block,
         pose_WB=[0.0, 0.0, 0.0],
         poses_WO=[0.175 + 0.55, 0.0, 0.0],
@@ -144,7 +145,7 @@ def test_each_sensor_has_its_own_noise_and_limits(bench):
     assert np.all(np.abs(errors.mean(axis=0)) < 5.0 * wanted / math.sqrt(1500))
     np.testing.assert_allclose(errors.std(axis=0), wanted, rtol=5 / math.sqrt(3000))
     # At 1.2 m the middle sensor hears nothing, and says 1 m.
-    at.block.GetInputPort("poses_WO").FixValue(at.context, [0.175 + 1.25, 0.0, 0.0])
+    at.set(poses_WO=[0.175 + 1.25, 0.0, 0.0])
     assert at.output("echo").tolist() == [1.0, 0.0, 1.0]
     assert at.output("ranges")[1] == 1.0
 

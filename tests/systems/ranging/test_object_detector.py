@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from phonotaxis.testing import Bench
 from systems.base.robot import RobotParameters
 from systems.ranging.beam_groups import EXTENT, NEAR_X, NEAR_Y, OPEN, group_beams
 from systems.ranging.object_detector import ObjectDetector, object_detector_step
@@ -302,10 +303,10 @@ def test_no_more_than_eight_and_the_nearest():
     np.testing.assert_allclose(away, np.linspace(0.55, 1.25, 8), atol=2e-3)
 
 
-def test_drake_compiled_code_and_the_step_agree(bench):
+def test_drake_compiled_code_and_the_step_agree():
     sensors = ring(36)
     compiled, plain = njit(object_detector_step), Driven(sensors)
-    at = bench(
+    at = Bench(
         plain.block,
         ranges=[2.0] * 36,
         echo=[0.0] * 36,
@@ -326,8 +327,7 @@ def test_drake_compiled_code_and_the_step_agree(bench):
         compiled(tick, state, inputs, outputs, plain.block.step.numbers)
         np.testing.assert_array_equal(outputs[0].reshape(8, 8), expected)
         names = "ranges", "echo", "range_ages", "pose_WB_estimated"
-        for name, values in zip(names, inputs, strict=True):
-            at.block.GetInputPort(name).FixValue(at.context, values)
+        at.set(**dict(zip(names, inputs, strict=True)))
         np.testing.assert_array_equal(at.output("objects_W"), expected.ravel())
         at.tick()
     np.testing.assert_array_equal(state, plain.state)

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
+from phonotaxis.testing import evaluate
 from systems.base.robot import RobotParameters
 from systems.framework.block import RunFacts, copied
 from systems.framework.input_error import InputError
@@ -141,12 +142,12 @@ def facts(start=(0.0, 0.0), mapped=()):
     return RunFacts(0, TICK_S, pose, TICK_S, lambda _: 0, {}, mapped)
 
 
-def test_the_first_route_is_that_of_the_map(bench):
+def test_the_first_route_is_that_of_the_map():
     """From P, and not from the axle."""
-    at = bench(make(known=[WALL]))
+    outputs = evaluate(make(known=[WALL]))
     expected = plan_route((0.0, 0.0), (4.0, 0.0), [WALL]).numbers
-    np.testing.assert_array_equal(at.output("route"), expected)
-    assert at.output("replans") == [0.0]
+    np.testing.assert_array_equal(outputs["route"], expected)
+    assert outputs["replans"] == [0.0]
 
 
 def test_it_comes_past_an_unknown_wall_and_compiled_the_same(compiled_tick):
@@ -242,7 +243,7 @@ def test_where_there_is_no_way_the_route_stays_until_there_is_one(compiled_tick)
     np.testing.assert_allclose(step.state.route[2:4], [1.0, 0.0], atol=1e-12)
 
 
-def test_without_replanning_the_route_stays(bench):
+def test_without_replanning_the_route_stays():
     off = WAITS.model_copy(update={"replan": False})
     planner, target = make(off), PathTarget(parameters=off, robot=ROBOT)
     rows = run_by_drake(planner, target, [WALL], 800)
