@@ -28,7 +28,8 @@ from systems.safety.braking import braked, roll_on
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
 from systems.safety.views import PlaceError, lasting
-from systems.world.geometry import fan_ranges, rectangle_clearance
+from systems.world.cones import fan_ranges
+from systems.world.geometry import rectangle_clearance
 
 SEED = 7
 RADIUS = 0.5 * math.hypot(0.35, 0.82)

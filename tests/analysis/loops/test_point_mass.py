@@ -22,11 +22,13 @@ LAWS = ("conventional", "active", "conventional2017", "active2017")
 
 def block_force(scenario, law, state, *, before=None):
     """Sum of forces by the blocks' functions; C a tick ago is that of ``before``."""
-    bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
+    bodies = [body.rectangles(0.0)[0] for body in scenario.bodies().values()]
 
     def vectors(p):
         slots = 3 if scenario.follower.collision_vector.aggregation == "sum" else 1
-        return nearest_vectors((p[0], p[1], 0.0), bodies, 0.0, 3.0, slots)
+        return nearest_vectors(
+            (p[0], p[1], 0.0), bodies, range(len(bodies)), 0.0, 3.0, slots
+        )
 
     C = {} if before is None else {round(v[0]): v[1:] for v in vectors(before)}
     closing = scenario.follower.collision_vector.velocity_term == "closing"
@@ -93,7 +95,7 @@ def test_distances_are_those_of_the_sensor(two_boxes):
         expected = [
             math.hypot(*v[0][1:])
             for p in points
-            if (v := nearest_vectors((*p, 0.0), [rectangle], 0.0, 99.0, 1))
+            if (v := nearest_vectors((*p, 0.0), [rectangle], [0], 0.0, 99.0, 1))
         ]
         np.testing.assert_allclose(model.distances(points)[:, k], expected, atol=1e-12)
 

@@ -22,7 +22,8 @@ from diagrams.running.stop_rules import Collision
 from diagrams.scenario.scenario import Scenario
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.ultrasonic_array import cone_ranges
-from systems.world.geometry import contact_time, rectangle_clearance
+from systems.world.contacts import contact_time
+from systems.world.geometry import rectangle_clearance
 
 TICK = 0.025
 #: Half the robot's length: P and its front face.

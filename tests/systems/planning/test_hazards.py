@@ -10,7 +10,7 @@ import pytest
 from systems.planning.hazards import make_hazards, pick_hazards, track_hazards
 from systems.planning.looks import HazardSensors
 from systems.safety.free_space import make_free_space
-from systems.world.geometry import fan_ranges
+from systems.world.cones import fan_ranges
 
 TICK_S, CELLS, CELL_M, AHEAD_M, FARTHEST_M = 0.025, 240, 0.05, 0.175, 3.0
 AXES, HALVES = np.radians([30.0, 0.0, -30.0]), np.full(3, math.radians(15.0))

@@ -73,16 +73,16 @@ def test_more_bodies_than_slots(bench):
 
 def test_of_bodies_at_one_distance_the_first_one_comes_first():
     """Ahead and behind, in either order."""
-    bodies = [(1.0, 0.0, 0.0, 0.2, 0.2), (-1.0, 0.0, 0.0, 0.2, 0.2)]
+    bodies = [(1.0, 0.0, 0.0, 0.2, 0.2, 0.0), (-1.0, 0.0, 0.0, 0.2, 0.2, 0.0)]
     for order in (bodies, bodies[::-1]):
-        vectors = nearest_vectors((0.0, 0.0, 0.0), order, 0.0, 9.0, 2)
+        vectors = nearest_vectors((0.0, 0.0, 0.0), order, range(2), 0.0, 9.0, 2)
         assert [feature for feature, _, _ in vectors] == [1.0, 2.0]
 
 
 @given(place, place, angle, place, place, angle)
 def test_nearest_point_against_a_grid(x, y, theta, x_O, y_O, theta_O):
-    body = (x_O, y_O, theta_O, 0.6, 0.4)
-    vectors = nearest_vectors((x, y, theta), [body], 0.175, 50.0, 1)
+    body = (x_O, y_O, theta_O, 0.6, 0.4, 0.0)
+    vectors = nearest_vectors((x, y, theta), [body], [0], 0.175, 50.0, 1)
     ((_, dx, dy),) = vectors
     p = np.array([x + 0.175 * math.cos(theta), y + 0.175 * math.sin(theta)])
     front_left, rear_left, _, front_right = rectangle_corners(body)

@@ -24,7 +24,7 @@ from systems.safety.free_space import (
     see,
 )
 from systems.safety.views import PlaceError, lasting, place_error, sensor_sectors
-from systems.world.geometry import fan_ranges
+from systems.world.cones import fan_ranges
 
 CONTROL_POINT_M = 0.175
 CELL_M = 0.05
