@@ -56,7 +56,7 @@ def look(
     for tick in ticks:
         time = tick * TICK_S
         pose = np.array(pose_at(time))
-        bodies = np.array(bodies_at(time), dtype=float).reshape(-1, 5)
+        bodies = np.array(bodies_at(time), dtype=float).reshape(-1, 6)
         true = fan_ranges(pose, bodies, AXES, PLACES, HALVES, AHEAD_M)
         echo = (true <= FARTHEST_M).astype(float)
         ranges = np.where(echo > 0.5, true + noise_m * rng.normal(size=3), FARTHEST_M)
@@ -71,7 +71,7 @@ def weaving(time):
 
 def crossing(time):
     """A post of 5 cm that crosses ahead at 0.36 m/s."""
-    return [(2.0 - 0.1 * time, 1.2 - 0.35 * time, 0.0, 0.05, 0.05)]
+    return [(2.0 - 0.1 * time, 1.2 - 0.35 * time, 0.0, 0.05, 0.05, 0.0)]
 
 
 def estimate(hazards):
@@ -121,7 +121,7 @@ def test_what_rests_is_never_tracked(turn, noise_m):
     space, hazards = floor(), make_hazards(3)
     for box in boxes:
         take(space, box)
-    bodies = [(x, y, 0.0, length, width) for x, y, length, width in boxes]
+    bodies = [(x, y, 0.0, length, width, 0.0) for x, y, length, width in boxes]
 
     def pose_at(time):
         return 0.3 * time, 0.0, turn * math.sin(math.tau * time / 2.7)

@@ -22,7 +22,7 @@ def scene(pose_WB=(0.0, 0.0, 0.0)) -> dict[str, object]:
     return {
         "pose_WB": pose_WB,
         "poses_WO": [0.175, 1.5, 0.0, 1.175 + 0.4, -1.3, math.pi / 2],
-        "sizes": [0.4, 1.0, 0.2, 0.8],
+        "sizes": [0.4, 1.0, 0.0, 0.2, 0.8, 0.0],
         "pose_WS": [3.0, 0.0, 0.0],
     }
 
@@ -65,7 +65,7 @@ def test_more_bodies_than_slots(bench):
         block,
         pose_WB=[0, 0, 0],
         poses_WO=[0, 2, 0, 0, -1.5, 0, 0, 1, 0, 2.5, 0, 0],
-        sizes=[0.1] * 8,
+        sizes=[0.1, 0.1, 0.0] * 4,
         pose_WS=FAR,
     )
     np.testing.assert_array_equal(at.output("features"), [3, 2, 1])
@@ -95,11 +95,12 @@ def test_nearest_point_against_a_grid(x, y, theta, x_O, y_O, theta_O):
 
 
 @pytest.mark.parametrize("all_bodies", [False, True])
-def test_gradient(bench, check_gradient, all_bodies):
+@pytest.mark.parametrize("radius", [0.0, 0.15])
+def test_gradient(bench, check_gradient, all_bodies, radius):
+    size = [0.4, 0.3, radius]
+
     def respond(block, x):
-        at = bench(
-            block, pose_WB=x[:3], poses_WO=x[3:6], sizes=[0.4, 0.3], pose_WS=x[6:]
-        )
+        at = bench(block, pose_WB=x[:3], poses_WO=x[3:6], sizes=size, pose_WS=x[6:])
         return [*at.output("collision_vectors_B"), *at.output("features")]
 
     block = IdealObstacleSensor(

@@ -131,7 +131,7 @@ def test_each_sensor_has_its_own_noise_and_limits(bench):
         block,
         pose_WB=[0.0, 0.0, 0.0],
         poses_WO=[0.175 + 0.55, 0.0, 0.0],
-        sizes=[0.1, 9.0],
+        sizes=[0.1, 9.0, 0.0],
         pose_WS=[-50.0, 0.0, 0.0],
     )
     rows = []

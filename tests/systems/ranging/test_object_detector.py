@@ -50,7 +50,8 @@ class Driven:
 
     def look(self, *bodies: Any, pose: Any = REST) -> Any:
         """The same of rectangles."""
-        rectangles = np.array(bodies, dtype=float).reshape(-1, 5)
+        boxes = np.array(bodies, dtype=float).reshape(-1, 5)
+        rectangles = np.pad(boxes, ((0, 0), (0, 1)))
         return self.see(cone_ranges(pose, rectangles, self.sensors, EPSILON), pose)
 
 
@@ -232,7 +233,7 @@ def test_a_wall_rests_however_the_noise_of_beams_moves_its_nearest_point():
     What is known of such a wall towards P alone is good to noise/sqrt(ticks).
     """
     noise = np.random.default_rng(1)
-    sensors, rectangles = ring(72), np.array([[0.55, 0.0, 0.0, 0.1, 1.4]])
+    sensors, rectangles = ring(72), np.array([[0.55, 0.0, 0.0, 0.1, 1.4, 0.0]])
     driven = Driven(sensors)
     for tick in range(400):
         t = 0.025 * tick

@@ -44,7 +44,8 @@ def approach(
     sensors = UltrasonicParameters.model_validate(
         {"noise_m": 0.0, "firing": firing, "period_s": period}
     )
-    far = {"poses_WO": [0.0] * 3, "sizes": [1.0, 30.0], "pose_WS": [90.0, 0.0, 0.0]}
+    sizes = [1.0, 30.0, 0.0]
+    far = {"poses_WO": [0.0] * 3, "sizes": sizes, "pose_WS": [90.0, 0.0, 0.0]}
     array = bench(
         UltrasonicArray(parameters=sensors, obstacle_count=1),
         pose_WB=[0.0] * 3,

@@ -26,7 +26,7 @@ EPSILON = 0.08
 ROBOT = RobotParameters(control_point_m=EPSILON)
 #: The point comes no nearer to anything, m.
 KEEP = 0.28
-WALL = (2.0, 0.2, 0.3, 0.1, 1.6)
+WALL = (2.0, 0.2, 0.3, 0.1, 1.6, 0.0)
 WAITS = RouteParameters(goal_m=(4.0, 0.0), timing="waiting")
 
 
@@ -268,10 +268,15 @@ def test_planning_anew_takes_less_than_10_ms(compiled_tick):
     """10 m x 10 m in cells of 5 cm, 20 boxes, 500 points seen; median of 7."""
     generator = np.random.default_rng(5)
     boxes = np.column_stack(
-        [generator.uniform(-4, 4, (20, 2)), np.zeros(20), np.full((20, 2), 0.4)]
+        [
+            generator.uniform(-4, 4, (20, 2)),
+            np.zeros(20),
+            np.full((20, 2), 0.4),
+            np.zeros(20),
+        ]
     )
     boxes = boxes[np.hypot(boxes[:, 0], boxes[:, 1]) > 1.0]
-    corners = [[-4.9, 0, 0, 0.2, 10], [4.9, 0, 0, 0.2, 10]]
+    corners = [[-4.9, 0, 0, 0.2, 10, 0], [4.9, 0, 0, 0.2, 10, 0]]
     own = RouteParameters(goal_m=(4.4, 4.4))
     boxes = boxes[np.hypot(boxes[:, 0] - 4.4, boxes[:, 1] - 4.4) > 1.0]
     planner = make(own, [*boxes, *corners], (-4.4, -4.4))
