@@ -116,7 +116,9 @@ def test_errors_name_the_field_of_the_sensor(setting, field):
 def test_each_cone_has_its_own_width():
     """A post 38 deg to the left, 0.8 m from P: within the wide cone alone."""
     angle = math.radians(38.0)
-    post = np.array([[0.8 * math.cos(angle), 0.8 * math.sin(angle), angle, 0.02, 0.02]])
+    post = np.array(
+        [[0.8 * math.cos(angle), 0.8 * math.sin(angle), angle, 0.02, 0.02, 0.0]]
+    )
     wide = RangeSensorParameters(axis_deg=-1.0, beam_half_angle_deg=40.0)
     both = UltrasonicParameters(sensors=(RangeSensorParameters(), wide))
     found = cone_ranges([0.0, 0.0, 0.0], post, both, 0.0)
