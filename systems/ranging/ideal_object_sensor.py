@@ -174,7 +174,7 @@ def _seen(
         slot[ROBOT] = 1.0 if numbers.robots[k] else 0.0
         away = math.hypot(slot[X], slot[Y])
         hidden = numbers.occlusion and _is_hidden(k, p_WP, slot, poses, sizes, owners)
-        # Of each body, only the nearest visible rectangle remains.
+        # Only the nearest visible rectangle of each body remains.
         if not goes_on:
             nearest, first = np.inf, -1
         if hidden or away > numbers.maximum_range_m or away >= nearest:
