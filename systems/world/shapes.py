@@ -99,6 +99,15 @@ class Shape:
         low, high = points.min(axis=0), points.max(axis=0)
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Place of a label: the middle of a polygon, or of the longest rectangle, m."""
+        if self.polygon is not None:
+            low_x, high_x, low_y, high_y = self.bounds
+            return 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
+        x, y = self.rectangles[np.argmax(self.rectangles[:, 3]), :2].tolist()
+        return x, y
+
 
 def rectangle_outline(rectangle: ArrayLike) -> Floats:
     """Returns the outline of a rectangle, counterclockwise from front left.
