@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from analysis.loops.point_mass import STEP_S, point_mass
 from diagrams.building.laws import make_controller
+from systems.framework.input_error import InputError
 from systems.laws.impedance_controller import (
     attraction_force,
     obstacle_speed,
@@ -17,6 +18,11 @@ from systems.laws.impedance_controller import (
 )
 from systems.ranging.ideal_obstacle_sensor import nearest_vectors
 
+#: A disc, and a wall with round ends.
+ROUND = (
+    "obstacles=[{name: disc, radius_m: 0.3, waypoints_m: [[2.0, 0.4]]}, "
+    "{name: wall, wall_m: [[3.0, -1.0], [3.5, -1.6]], thickness_m: 0.4}]"
+)
 LAWS = ("conventional", "active", "conventional2017", "active2017")
 
 
@@ -68,11 +74,13 @@ def test_force_at_rest_is_that_of_the_blocks(two_boxes, law, aggregation):
     np.testing.assert_allclose(model.force(free, "none"), expected, atol=2e-4)
 
 
+@pytest.mark.parametrize("round_", [False, True])
 @pytest.mark.parametrize("term", ["printed", "closing"])
 @pytest.mark.parametrize("law", LAWS)
-def test_force_in_motion_is_that_of_the_blocks(two_boxes, law, term):
+def test_force_in_motion_is_that_of_the_blocks(two_boxes, law, term, round_):
     """The blocks' difference over a very short tick is the derivative here."""
-    scenario = two_boxes(law, f"collision_vector.velocity_term={term}")
+    obstacles = (ROUND,) if round_ else ()
+    scenario = two_boxes(law, f"collision_vector.velocity_term={term}", *obstacles)
     model = point_mass(scenario)
     function = make_controller(scenario).radial_force
     free = states(200)
@@ -86,6 +94,13 @@ def test_force_in_motion_is_that_of_the_blocks(two_boxes, law, term):
     near_reach = np.abs(model.clearances(free[:, :2]) - 0.8) < 2e-3
     found = model.force(free, term)[~near_reach]
     np.testing.assert_allclose(found, np.array(expected)[~near_reach], atol=1e-3)
+
+
+def test_pushes_of_walls_with_corners_are_not_added(two_boxes):
+    corner = "obstacles=[{name: L, wall_m: [[2, -1], [2, 1], [3, 1]]}]"
+    with pytest.raises(InputError, match="'sum' has no model with 'L'"):
+        point_mass(two_boxes("active", corner, "collision_vector.aggregation=sum"))
+    assert len(point_mass(two_boxes("active", corner)).rectangles) == 3
 
 
 def test_distances_are_those_of_the_sensor(two_boxes):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -44,10 +45,8 @@ def test_a_wall_is_what_lies_near_its_line(px, py):
     """Half of 0.4 m from the line, by 3,000 points of it."""
     points = ((-2.0, 0.0), (1.0, 0.0), (1.0, 2.0))
     off = distance(wall(points, 0.4), (0.5, 0.0, 0.0), (px, py))
-    line = np.concatenate(
-        [np.linspace(a, b, 1500) for a, b in zip(points[:-1], points[1:], strict=True)]
-    )
-    sampled = np.min(np.hypot(*(line + [0.5, 0.0] - [px, py]).T)) - 0.2
+    line = np.concatenate([np.linspace(a, b, 1500) for a, b in pairwise(points)])
+    sampled = np.min(np.hypot(*(line - [px - 0.5, py]).T)) - 0.2
     assert off == pytest.approx(max(sampled, 0.0), abs=2e-3)
 
 
