@@ -537,7 +537,7 @@ def collision(x: float, y: float, theta: float, *, ticks: int = 81) -> RunResult
         source={"waypoints_m": [[0.0, 5.0]]},
     )
     array = UltrasonicParameters()
-    body = np.array([[2.0, 0.0, 0.0, 0.1, 0.1]])
+    body = np.array([[2.0, 0.0, 0.0, 0.1, 0.1, 0.0]])
     for tick, pose in enumerate(result.poses("WB")):
         ranges = cone_ranges(pose, body, array, FRONT)
         echo = ranges <= array.maximum_range_m

@@ -119,7 +119,7 @@ def test_among_boxes_it_is_what_a_grid_finds(seed):
             generator.uniform(-1.2, 1.2, (4, 2)),
             generator.uniform(-3, 3, 4),
             generator.uniform(0.1, 0.8, (4, 2)),
-            [0.0, 0.0, 0.1, 0.2],
+            [0.0, 0.0, 0.05, 0.15],
         ]
     )
     task = ((-2.5, 0.0), (2.5, 0.0), 0.5, boxes, 0.3)
