@@ -265,7 +265,7 @@ class IdealObjectSensor(Block):
     inputs = (
         Port("pose_WB", 3, "m, m, rad"),
         Port("poses_WO", "3 rectangles", "m, m, rad each"),
-        Port("sizes", "3 rectangles", "length, width and radius of each, m"),
+        Port("sizes", "3 rectangles", "m, m, m each"),
     )
     outputs = (OBJECTS_PORT,)
 

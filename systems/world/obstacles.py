@@ -20,7 +20,8 @@ def Obstacles_(T):
 
         An obstacle consists of one or more rectangles (``systems.world.plane``). Each
         output port lists the values of all rectangles, one obstacle after the other.
-        The outputs depend only on time. The block has no state and no latency.
+        A size consists of length, width and radius. The outputs depend only on time.
+        The block has no state and no latency.
 
         Args:
             obstacles: A sequence of ``ObstacleParameters``.
@@ -30,7 +31,7 @@ def Obstacles_(T):
         outputs = (
             Port("poses_WO", "3 rectangles", "m, m, rad each"),
             Port("velocities_WO", "3 rectangles", "m/s, m/s, rad/s each"),
-            Port("sizes", "3 rectangles", "length, width and radius of each, m"),
+            Port("sizes", "3 rectangles", "m, m, m each"),
         )
 
         def _construct(

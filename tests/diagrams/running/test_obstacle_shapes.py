@@ -187,7 +187,7 @@ def test_goals_inside_a_polygon_are_refused():
 def test_a_disc_that_turns_is_no_faster_than_its_center():
     """A box of its size has corners that swing out in the bend."""
     path = {"waypoints_m": [[3.0, 2.0], [3.0, 0.0], [5.0, 0.0]], "speed_m_s": 0.5}
-    fast = {}
+    fast: dict[str, float] = {}
     for name, shape in (("disc", {"radius_m": 0.3}), ("box", {"size_m": [0.6, 0.6]})):
         obstacle = {"name": name, **shape, **path}
         scenario = load_scenario("default", {"obstacles": [obstacle]})

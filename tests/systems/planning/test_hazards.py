@@ -138,7 +138,7 @@ def test_what_is_followed_is_not_tracked():
     hazards = make_hazards(3)
     for tick in range(120):
         x, y = 1.5 + 0.3 * tick * TICK_S, 0.1
-        body = [(x, y, 0.0, 0.29, 0.29)]
+        body = [(x, y, 0.0, 0.29, 0.29, 0.0)]
         look(
             hazards,
             [tick],

@@ -284,7 +284,7 @@ def test_held_ranges_stay_where_they_were_seen():
     driven, held = Driven(sensors), [math.inf] * 3
     for tick in range(31):
         pose = 0.02 * tick - EPSILON, 0.0, 0.0
-        wall = np.array([[1.6, 0.0, 0.0, 0.2, 9.0]])
+        wall = np.array([[1.6, 0.0, 0.0, 0.2, 9.0, 0.0]])
         held[tick % 3] = cone_ranges(pose, wall, sensors, EPSILON)[tick % 3]
         ages = [0.025 * ((tick - k) % 3) for k in range(3)]
         objects = driven.see(held, pose, ages)
@@ -316,9 +316,8 @@ def test_drake_compiled_code_and_the_step_agree(bench):
     state = np.array(plain.state)
     for tick in range(30):
         pose = 0.004 * tick - EPSILON, 0.0, 0.01 * tick
-        bodies = np.array(
-            [[1.4 - 0.005 * tick, 0.2, 0.3, 0.4, 0.3], [0.0, 1.0, 0.0, 9.0, 0.2]]
-        )
+        box = [1.4 - 0.005 * tick, 0.2, 0.3, 0.4, 0.3, 0.0]
+        bodies = np.array([box, [0.0, 1.0, 0.0, 9.0, 0.2, 0.0]])
         ranges = cone_ranges(pose, bodies, sensors, EPSILON)
         expected = plain.see(ranges, pose)
         echo = (ranges <= 2.0).astype(float)

@@ -180,7 +180,7 @@ def ticks_of_replans(planner, tick, objects, pose, count, progress=(0.5, 0.3)):
 
 
 STANDS = (1.0 - EPSILON, 0.0, 0.0)
-POST = [(1.4, 0.0, 0.0, 0.1, 0.1)]
+POST = [(1.4, 0.0, 0.0, 0.1, 0.1, 0.0)]
 
 
 def test_it_plans_anew_after_6_s_without_way(compiled_tick):
@@ -309,4 +309,4 @@ def test_parameters_that_cannot_serve_are_refused(field, value):
 
 def test_a_goal_in_an_obstacle_is_refused():
     with pytest.raises(InputError, match="goal_m"):
-        make(known=[(4.0, 0.2, 0.0, 1.0, 1.0)])
+        make(known=[(4.0, 0.2, 0.0, 1.0, 1.0, 0.0)])

@@ -14,7 +14,7 @@ from systems.routes.route import ROUTE_POINTS, ROUTE_SIZE, plan_route
 from systems.world.geometry import rectangle_corners
 
 CLEARANCE = 0.35
-ROOM = [[-5.0, 0, 0, 0.1, 10.2], [5, 0, 0, 0.1, 10.2]]
+ROOM = [[-5.0, 0, 0, 0.1, 10.2, 0], [5, 0, 0, 0.1, 10.2, 0]]
 ROOM += [[0, -5.0, 0, 10.2, 0.1, 0], [0, 5, 0, 10.2, 0.1, 0]]
 
 
