@@ -59,6 +59,21 @@ def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     return Scenario.model_validate(data)
 
 
+def require_single_rectangles(scenario: Scenario) -> None:
+    """Raises InputError if a body is a wall with a corner, or a polygon.
+
+    The models that add the pushes of bodies add those of all rectangles, but such a
+    body pushes with its nearest rectangle only.
+    """
+    for name, body in scenario.bodies().items():
+        if len(body.shape.rectangles) > 1:
+            raise InputError(
+                "collision_vector.aggregation",
+                f"'sum' has no model with {name!r}, which consists of several edges; "
+                "use 'paper' or 'nearest', or a box or a disc instead",
+            )
+
+
 def require_rolling(plant: PlantParameters) -> None:
     """Raises InputError if the wheels can slip (``plant.friction`` is set)."""
     if plant.friction is not None:

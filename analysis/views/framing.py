@@ -12,6 +12,7 @@ from diagrams import RunResult, Scenario
 from diagrams.running.stop_rules import SUCCESSFUL
 from diagrams.scenario.bodies import Path
 from diagrams.scenario.participants import Router
+from systems.world.plane import rectangle_corners
 
 #: Possible intervals between the times that a picture shows, s. They are round numbers.
 _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
@@ -56,10 +57,11 @@ def picture_title(result: RunResult) -> str:
 def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
     """Returns a rectangle that contains the centers of all bodies during the whole run.
 
-    The rectangle has the least x, greatest x, least y and greatest y in the world frame
-    W, m. It extends beyond all centers by ``margin``, m. It includes the walls of the
-    room, if there is a room. It ignores estimated positions, because a large error
-    would enlarge the picture too much.
+    Of walls and polygons, it contains all corners. The rectangle has the least x,
+    greatest x, least y and greatest y in the world frame W, m. It extends beyond all
+    centers by ``margin``, m. It includes the walls of the room, if there is a room. It
+    ignores estimated positions, because a large error would enlarge the picture too
+    much.
     """
     centers = [
         own.poses(body)[:, :2]
@@ -97,8 +99,14 @@ def _bounds(
 ) -> tuple[float, float, float, float]:
     """Returns a rectangle around points and around the paths of other bodies."""
     paths: list[Path] = [each.path() for each in scenario.sources.values()]
-    paths += [obstacle.path() for obstacle in scenario.obstacles]
     centers += [path.poses(times)[:, :2] for path in paths]
+    for each in scenario.obstacles:
+        poses, shape = each.path().poses(times), each.shape()
+        if shape.centered:
+            centers.append(poses[:, :2])
+        else:
+            rows = shape.at(poses).reshape(-1, 6)
+            centers += [rectangle_corners(row) for row in rows]
     points = np.concatenate(centers)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     if scenario.room is not None:

@@ -28,7 +28,7 @@ from analysis.runs.known_space import known_space
 from analysis.views.curves import page_charts
 from analysis.views.floor_layers import clipped, floor_layers
 from analysis.views.framing import floor_rectangle, shown_rectangle
-from analysis.views.meshes import Mesh, arrow, circle, rectangles, ribbon, star
+from analysis.views.meshes import Mesh, arrow, circle, prism, rectangles, ribbon, star
 from analysis.views.overlays import Arrow, Ball, Bar, Circle, Disc, Frame, overlays
 from analysis.views.plume_history import plume_history
 from analysis.views.replay_page import replay_page
@@ -36,12 +36,12 @@ from analysis.views.replay_stage import add_floor, set_stage
 from analysis.views.scene import (
     BODY_HEIGHT_M,
     ROBOT_HEIGHT_M,
-    Box,
     Cone,
     Contact,
     Estimate,
     Goal,
     KnownFloor,
+    Obstacle,
     Plume,
     Rings,
     RobotBody,
@@ -59,6 +59,7 @@ from diagrams.scenario.bodies import RecordedPath
 from systems.base.robot import RobotParameters, microphones_B
 from systems.odor.odor_plume import PUFF_SIZE, PUFFS_BEGIN
 from systems.odor.parameters import CONTAINER_M
+from systems.world.shapes import rectangle_outline
 
 #: Largest number of frames per second that Meshcat records.
 FRAMES_PER_S = 32.0
@@ -323,11 +324,10 @@ class _Recorder:
                 self._robot(thing, shape)
             case SourceBody() as shape:
                 self._source(thing, shape)
-            case Box() | Touched() as size:
+            case Obstacle() | Touched() as shape:
                 # The touched body covers the body itself.
-                more = 0.01 if isinstance(size, Touched) else 0.0
-                box, middle = Block(*(each + more for each in size)), 0.5 * size.height
-                self.put(f"{path}/box", box, color, _placed(0.0, 0.0, middle))
+                more = 0.01 if isinstance(shape, Touched) else 0.0
+                self._solid(path, shape, more, color)
             case Walls() as shape:
                 self._walls(thing, shape)
             case Cone() as shape:
@@ -346,6 +346,27 @@ class _Recorder:
             case shape if type(shape) in _SINGLE:
                 single = _SINGLE[type(shape)](shape)
                 self.put(path, single, color, alpha=thing.alpha)
+
+    def _solid(
+        self, path: str, body: Obstacle | Touched, more: float, color: str
+    ) -> None:
+        """Adds a body that is larger than its shape by ``more``, m, in all extents."""
+        shape, middle = body.shape, _placed(0.0, 0.0, 0.5 * body.height)
+        height = body.height + more
+        if shape.centered:
+            length, width, radius = shape.rectangles[0, 3:].tolist()
+            if radius == 0.0:
+                box = Block(length + more, width + more, height)
+                self.put(f"{path}/box", box, color, middle)
+                return
+            if length == width == 0.0:
+                disc = Cylinder(radius + 0.5 * more, height)
+                self.put(f"{path}/disc", disc, color, middle)
+                return
+        grown = shape.rectangles + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * more])
+        outlines = [*shape.outlines, *map(rectangle_outline, grown if more else [])]
+        for number, outline in enumerate(outlines):
+            self.put(f"{path}/part_{number}", prism(outline, height), color)
 
     def _robot(self, thing: Thing, shape: RobotBody) -> None:
         """Adds a robot at the origin of its body frame B."""

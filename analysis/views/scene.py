@@ -26,25 +26,24 @@ from diagrams import RunResult, Scenario
 from diagrams.scenario.participants import HasRangeSensors, Robot
 from systems.base.robot import RobotParameters
 from systems.world.geometry import rotate
+from systems.world.shapes import Shape
 
 #: Heights of the bodies, m. The model has no heights, so these values are only for the
 #: display.
 ROBOT_HEIGHT_M, BODY_HEIGHT_M = 0.16, 0.35
 
 
-class Box(NamedTuple):
+class Obstacle(NamedTuple):
     """An obstacle."""
 
-    length: float
-    width: float
+    shape: Shape
     height: float
 
 
 class Touched(NamedTuple):
     """A body that a robot has touched. It is shown from the collision on."""
 
-    length: float
-    width: float
+    shape: Shape
     height: float
 
 
@@ -268,9 +267,9 @@ def scene_bodies(
     for each in scenario.obstacles:
         poses = each.path().poses(times if each.path().moves else times[:1])
         label = "moving obstacle" if each.path().moves else "obstacle at rest"
-        box, path = Box(*each.size_m, BODY_HEIGHT_M), f"obstacles/{each.name}"
+        solid, path = Obstacle(each.shape(), BODY_HEIGHT_M), f"obstacles/{each.name}"
         color = COLORS["obstacle"]
-        found[each.name] = Thing(path, box, color, times, poses, each.name, label)
+        found[each.name] = Thing(path, solid, color, times, poses, each.name, label)
     return found
 
 
@@ -340,16 +339,14 @@ def _collisions(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Laye
         hit, robot = own.collision, bodies[name]
         after = own.time >= hit.time - 1e-9
         after[-1] = True
-        x, y, theta, length, width = own.surroundings.bodies[hit.object].rectangle(
-            hit.time
-        )
+        body = own.surroundings.bodies[hit.object]
         carrier, place = bodies.get(hit.object), np.zeros((1, 3))
         if carrier is None:
-            place = np.array([[x, y, theta]])
+            place = np.array([body.path.pose(hit.time)])
         things.append(
             Thing(
                 f"{carrier.path if carrier else 'collision/' + robot.path}/hit",
-                Touched(length, width, BODY_HEIGHT_M),
+                Touched(body.shape, BODY_HEIGHT_M),
                 color,
                 own.time,
                 place,

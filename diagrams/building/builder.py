@@ -206,12 +206,13 @@ def robot_of(
         The diagram, see ``make_robot``.
     """
     own, target = scenario.of_robot(name), scenario.target(name)
+    around = scenario.surroundings(name)
     if name not in audible_sounds(scenario):
         own = own.with_robot(loudspeaker=None)
     return make_robot(
         own,
         name,
-        bodies=len(scenario.surroundings(name).obstacles),
+        owners=around.owners,
         robots=scenario.robots_seen(name),
         others=[each for each in scenario.sounds() if each != target],
         listeners_frame_s=scenario.longest_frame_s,
@@ -248,10 +249,11 @@ class _World:
         self._give(name, "emission", lambda: self._emission(target))
         for other in self.scenario.sounds():
             self._give(name, f"emission_{other}", lambda o=other: self._emission(o))
-        boxes = len(self.scenario.obstacles)
-        others = dict([*around.obstacles.items()][boxes:])
+        obstacles = len(self.scenario.obstacles)
+        others = dict([*around.obstacles.items()][obstacles:])
         poses = [self._pose(other) for other in others]
-        sizes = [extent for body in others.values() for extent in body.size]
+        shapes = [body.shape for body in others.values()]
+        sizes = [extent for shape in shapes for extent in shape.rectangles[0, 3:]]
         self._give(name, "poses_WO", lambda: self._joined(name, "poses_WO", poses))
         self._give(
             name,

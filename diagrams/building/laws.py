@@ -54,7 +54,7 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
 
     Args:
         scenario: Scenario with the law and the parameters of its block.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
+        bodies: Number of rectangles in the inputs ``poses_WO`` and ``sizes``.
         seed: Seed of a law that uses random numbers.
 
     Returns:

@@ -145,7 +145,7 @@ def robot_blocks(
     scenario: Scenario,
     name: str = ROBOT,
     *,
-    bodies: int = 0,
+    owners: Sequence[int] = (),
     robots: Sequence[int] = (),
     others: Sequence[str] = (),
 ) -> dict[str, Any]:
@@ -154,8 +154,9 @@ def robot_blocks(
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         name: Name of the robot. The random numbers of the robot depend on its name.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
-        robots: Indices of those bodies that are robots.
+        owners: Number of the body of each rectangle in the inputs ``poses_WO`` and
+            ``sizes``, ascending from 0.
+        robots: Numbers of those bodies that are robots.
         others: Names of the sources and loudspeakers that the robot does not follow.
 
     Returns:
@@ -167,22 +168,22 @@ def robot_blocks(
     """
     robot, own_seed = scenario.only, partial(seed_of, scenario, owner=name)
     seed = own_seed("controller")
-    controller = make_controller(scenario, bodies=bodies, seed=seed)
+    controller = make_controller(scenario, bodies=len(owners), seed=seed)
     if robot.searches is not None:
         sensing = searching_blocks(
             scenario,
-            bodies=bodies,
+            owners=owners,
             others=others,
             seed_of=own_seed,
         )
     elif isinstance(robot, Follower):
         sensing = following_blocks(
-            scenario, controller, bodies=bodies, others=others, seed_of=own_seed
+            scenario, controller, owners=owners, others=others, seed_of=own_seed
         )
     else:
         with fields_of("robots", name):
             sensing = routed_blocks(
-                scenario, bodies=bodies, robots=robots, seed_of=own_seed
+                scenario, owners=owners, robots=robots, seed_of=own_seed
             )
     ours = [
         DiffDrivePlant(
@@ -205,7 +206,7 @@ def robot_blocks(
         {
             "scenario": scenario,
             "robot": robot.robot,
-            "bodies": bodies,
+            "bodies": len(owners),
             "tick_s": scenario.tick_s,
             "seed": seed_of(scenario, "own_block", name),
         },
@@ -216,7 +217,7 @@ def make_robot(
     scenario: Scenario,
     name: str = ROBOT,
     *,
-    bodies: int = 0,
+    owners: Sequence[int] = (),
     robots: Sequence[int] = (),
     others: Sequence[str] = (),
     listeners_frame_s: float = TICK_S,
@@ -246,8 +247,9 @@ def make_robot(
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         name: Name of the robot. The random numbers of the robot depend on its name.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
-        robots: Indices of those bodies that are robots.
+        owners: Number of the body of each rectangle in the inputs ``poses_WO`` and
+            ``sizes``, ascending from 0.
+        robots: Numbers of those bodies that are robots.
         others: Names of the sources and loudspeakers that the robot does not follow.
         listeners_frame_s: Longest audio frame of the robots that hear the loudspeaker,
             s.
@@ -262,7 +264,7 @@ def make_robot(
     Raises:
         InputError: The law is not known, or a sound file cannot be played.
     """
-    by_part = robot_blocks(scenario, name, bodies=bodies, robots=robots, others=others)
+    by_part = robot_blocks(scenario, name, owners=owners, robots=robots, others=others)
     blocks, plant = [*by_part.values()], by_part["plant"]
     given = signal_sources(blocks, signals or {}, scenario.tick_s)
     # The log keeps the last of several columns of the same name, that of the signal.

@@ -49,9 +49,9 @@ def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
 
 
 def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
-    """Rectangles in W of the obstacles at rest, by name."""
+    """(n, 6) rectangles in W of the obstacles at rest, by name."""
     return {
-        each.name: Body(each.path(), each.size_m).rectangle(0.0)
+        each.name: Body(each.path(), each.shape()).rectangles(0.0)
         for each in scenario.obstacles
         if not each.path().moves
     }
@@ -63,8 +63,7 @@ def _of_the_start(
     """Warns if the control point P starts too near to a known obstacle.
 
     The limit is the clearance of the robot's route. ``known`` contains the known
-    obstacles as (k, 5) rectangles (x, y, theta, length, width) in the world frame W, m
-    and rad.
+    obstacles as (k, 6) rectangles in the world frame W, m and rad.
     """
     place = control_point(robot.start.pose, robot.robot.control_point_m)
     off = (math.hypot(*beyond_rectangle(place, each)) for each in known)

@@ -230,7 +230,7 @@ def test_both_followers_of_one_source_complete():
 
 def test_a_robot_alone_has_ports_to_be_wired_by_hand():
     scenario = Scenario.model_validate({"loudspeaker": {}})
-    robot = make_robot(scenario, "mine", bodies=2, others=["radio"])
+    robot = make_robot(scenario, "mine", owners=(0, 1), others=["radio"])
     inputs = {
         robot.get_input_port(k).get_name(): robot.get_input_port(k)
         for k in range(robot.num_input_ports())

@@ -24,7 +24,7 @@ def scene(pose_WB=(0.0, 0.0, 0.0)) -> dict[str, Any]:
     return {
         "pose_WB": pose_WB,
         "poses_WO": [0.175, 1.5, 0.0, 1.175 + 0.4, -1.3, math.pi / 2],
-        "sizes": [0.4, 1.0, 0.2, 0.8],
+        "sizes": [0.4, 1.0, 0.0, 0.2, 0.8, 0.0],
         "pose_WS": [3.0, 0.0, 0.0],
     }
 
@@ -67,7 +67,7 @@ def test_more_bodies_than_slots():
         block,
         pose_WB=[0, 0, 0],
         poses_WO=[0, 2, 0, 0, -1.5, 0, 0, 1, 0, 2.5, 0, 0],
-        sizes=[0.1] * 8,
+        sizes=[0.1, 0.1, 0.0] * 4,
         pose_WS=FAR,
     )
     np.testing.assert_array_equal(outputs["features"], [3, 2, 1])
@@ -75,16 +75,16 @@ def test_more_bodies_than_slots():
 
 def test_of_bodies_at_one_distance_the_first_one_comes_first():
     """Ahead and behind, in either order."""
-    bodies = [(1.0, 0.0, 0.0, 0.2, 0.2), (-1.0, 0.0, 0.0, 0.2, 0.2)]
+    bodies = [(1.0, 0.0, 0.0, 0.2, 0.2, 0.0), (-1.0, 0.0, 0.0, 0.2, 0.2, 0.0)]
     for order in (bodies, bodies[::-1]):
-        vectors = nearest_vectors((0.0, 0.0, 0.0), order, 0.0, 9.0, 2)
+        vectors = nearest_vectors((0.0, 0.0, 0.0), order, range(2), 0.0, 9.0, 2)
         assert [feature for feature, _, _ in vectors] == [1.0, 2.0]
 
 
 @given(place, place, angle, place, place, angle)
 def test_nearest_point_against_a_grid(x, y, theta, x_O, y_O, theta_O):
-    body = (x_O, y_O, theta_O, 0.6, 0.4)
-    vectors = nearest_vectors((x, y, theta), [body], 0.175, 50.0, 1)
+    body = (x_O, y_O, theta_O, 0.6, 0.4, 0.0)
+    vectors = nearest_vectors((x, y, theta), [body], [0], 0.175, 50.0, 1)
     ((_, dx, dy),) = vectors
     p = np.array([x + 0.175 * math.cos(theta), y + 0.175 * math.sin(theta)])
     front_left, rear_left, _, front_right = rectangle_corners(body)
@@ -97,7 +97,8 @@ def test_nearest_point_against_a_grid(x, y, theta, x_O, y_O, theta_O):
 
 
 @pytest.mark.parametrize("all_bodies", [False, True])
-def test_gradient(all_bodies):
+@pytest.mark.parametrize("radius", [0.0, 0.15])
+def test_gradient(all_bodies, radius):
     block = IdealObstacleSensor(
         robot=RobotParameters(control_point_m=0.2),
         maximum_range_m=1.4,
@@ -109,7 +110,7 @@ def test_gradient(all_bodies):
         block,
         pose_WB=[0.1, -0.2, 0.4],
         poses_WO=[1.3, 0.5, 0.7],
-        sizes=[0.4, 0.3],
+        sizes=[0.4, 0.3, radius],
         pose_WS=[0.3, -1.2, 0.2],
         hold=["sizes"],
     )

@@ -117,7 +117,9 @@ def test_errors_name_the_field_of_the_sensor(setting, field):
 def test_each_cone_has_its_own_width():
     """A post 38 deg to the left, 0.8 m from P: within the wide cone alone."""
     angle = math.radians(38.0)
-    post = np.array([[0.8 * math.cos(angle), 0.8 * math.sin(angle), angle, 0.02, 0.02]])
+    post = np.array(
+        [[0.8 * math.cos(angle), 0.8 * math.sin(angle), angle, 0.02, 0.02, 0.0]]
+    )
     wide = RangeSensorParameters(axis_deg=-1.0, beam_half_angle_deg=40.0)
     both = UltrasonicParameters(sensors=(RangeSensorParameters(), wide))
     found = cone_ranges([0.0, 0.0, 0.0], post, both, 0.0)
@@ -132,7 +134,7 @@ def test_each_sensor_has_its_own_noise_and_limits():
         block,
         pose_WB=[0.0, 0.0, 0.0],
         poses_WO=[0.175 + 0.55, 0.0, 0.0],
-        sizes=[0.1, 9.0],
+        sizes=[0.1, 9.0, 0.0],
         pose_WS=[-50.0, 0.0, 0.0],
     )
     rows = []

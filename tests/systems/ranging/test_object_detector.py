@@ -51,7 +51,8 @@ class Driven:
 
     def look(self, *bodies: Any, pose: Any = REST) -> Any:
         """The same of rectangles."""
-        rectangles = np.array(bodies, dtype=float).reshape(-1, 5)
+        boxes = np.array(bodies, dtype=float).reshape(-1, 5)
+        rectangles = np.pad(boxes, ((0, 0), (0, 1)))
         return self.see(cone_ranges(pose, rectangles, self.sensors, EPSILON), pose)
 
 
@@ -233,7 +234,7 @@ def test_a_wall_rests_however_the_noise_of_beams_moves_its_nearest_point():
     What is known of such a wall towards P alone is good to noise/sqrt(ticks).
     """
     noise = np.random.default_rng(1)
-    sensors, rectangles = ring(72), np.array([[0.55, 0.0, 0.0, 0.1, 1.4]])
+    sensors, rectangles = ring(72), np.array([[0.55, 0.0, 0.0, 0.1, 1.4, 0.0]])
     driven = Driven(sensors)
     for tick in range(400):
         t = 0.025 * tick
@@ -284,7 +285,7 @@ def test_held_ranges_stay_where_they_were_seen():
     driven, held = Driven(sensors), [math.inf] * 3
     for tick in range(31):
         pose = 0.02 * tick - EPSILON, 0.0, 0.0
-        wall = np.array([[1.6, 0.0, 0.0, 0.2, 9.0]])
+        wall = np.array([[1.6, 0.0, 0.0, 0.2, 9.0, 0.0]])
         held[tick % 3] = cone_ranges(pose, wall, sensors, EPSILON)[tick % 3]
         ages = [0.025 * ((tick - k) % 3) for k in range(3)]
         objects = driven.see(held, pose, ages)
@@ -316,9 +317,8 @@ def test_drake_compiled_code_and_the_step_agree():
     state = np.array(plain.state)
     for tick in range(30):
         pose = 0.004 * tick - EPSILON, 0.0, 0.01 * tick
-        bodies = np.array(
-            [[1.4 - 0.005 * tick, 0.2, 0.3, 0.4, 0.3], [0.0, 1.0, 0.0, 9.0, 0.2]]
-        )
+        box = [1.4 - 0.005 * tick, 0.2, 0.3, 0.4, 0.3, 0.0]
+        bodies = np.array([box, [0.0, 1.0, 0.0, 9.0, 0.2, 0.0]])
         ranges = cone_ranges(pose, bodies, sensors, EPSILON)
         expected = plain.see(ranges, pose)
         echo = (ranges <= 2.0).astype(float)

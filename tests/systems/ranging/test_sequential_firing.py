@@ -47,7 +47,7 @@ def approach(
     )
     far: dict[str, Any] = {
         "poses_WO": [0.0] * 3,
-        "sizes": [1.0, 30.0],
+        "sizes": [1.0, 30.0, 0.0],
         "pose_WS": [90.0, 0.0, 0.0],
     }
     array = Bench(

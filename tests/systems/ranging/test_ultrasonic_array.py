@@ -27,7 +27,7 @@ def wall_ahead(distance: float, *, pose_WB=(0.0, 0.0, 0.0)) -> dict[str, Any]:
     x, y, theta = pose_WB
     ahead = 0.175 + distance + 0.5
     pose = [x + ahead * math.cos(theta), y + ahead * math.sin(theta), theta]
-    sizes = [1.0, 30.0]
+    sizes = [1.0, 30.0, 0.0]
     return {"pose_WB": pose_WB, "poses_WO": pose, "sizes": sizes, "pose_WS": FAR}
 
 
@@ -46,7 +46,7 @@ def test_left_sensor_comes_first():
         make_array(),
         pose_WB=[0, 0, 0],
         poses_WO=left,
-        sizes=[0.2, 0.2],
+        sizes=[0.2, 0.2, 0.0],
         pose_WS=FAR,
     )
     np.testing.assert_array_equal(outputs["echo"], [1, 0, 0])
@@ -58,7 +58,7 @@ def test_master_robot_is_seen():
         make_array(source_size=(0.326, 0.352)),
         pose_WB=[0, 0, 0],
         poses_WO=FAR,
-        sizes=[0.1, 0.1],
+        sizes=[0.1, 0.1, 0.0],
         pose_WS=[1.5, 0.0, 0.0],
     )
     assert outputs["ranges"][1] == pytest.approx(1.5 - 0.163 - 0.175)
@@ -66,7 +66,7 @@ def test_master_robot_is_seen():
 
 def test_each_of_several_boxes_is_seen():
     """Three in a row ahead; each is the nearest when the ones before it are away."""
-    sizes = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
+    sizes = [0.2, 0.3, 0.0, 0.4, 0.5, 0.0, 0.6, 0.7, 0.0]
     faces = [1.0 - 0.1, 1.5 - 0.2, 2.0 - 0.3]
     block = UltrasonicArray(parameters=QUIET, obstacle_count=3)
     for gone, face in enumerate(faces):

@@ -34,7 +34,7 @@ def test_ports_hold_obstacle_after_obstacle():
     np.testing.assert_allclose(outputs["poses_WO"], poses, atol=1e-15)
     velocities = [0.0, 0.0, 0.0, 0.0, -0.5, 0.0]
     np.testing.assert_allclose(outputs["velocities_WO"], velocities, atol=1e-15)
-    np.testing.assert_array_equal(outputs["sizes"], [0.4, 0.1, 0.2, 0.3])
+    np.testing.assert_array_equal(outputs["sizes"], [0.4, 0.1, 0.0, 0.2, 0.3, 0.0])
 
 
 def test_moving_boxes_follow_time_in_one_context():
