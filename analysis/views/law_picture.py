@@ -18,9 +18,9 @@ from analysis.report.palette import COLORS, ROBOT_COLORS, draw_grid
 from analysis.views.framing import picture_times, tick_at
 from analysis.views.picture import draw_scene, map_axes
 from analysis.views.scene import (
-    Box,
     Contact,
     Goal,
+    Obstacle,
     Scene,
     SourceBody,
     Thing,
@@ -65,7 +65,7 @@ def plot_laws(results: Mapping[str, RunResult]) -> Figure:
     things = [
         thing
         for thing in scene.things
-        if isinstance(thing.shape, Box | Walls | SourceBody | Goal)
+        if isinstance(thing.shape, Obstacle | Walls | SourceBody | Goal)
         or (isinstance(thing.shape, Trail) and thing.shape.line == "--")
     ]
     _draw(axes, scene, things)
