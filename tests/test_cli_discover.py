@@ -99,16 +99,30 @@ def test_examples_of_the_help_are_commands():
 
 def test_init_copies_the_template_once(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    status, out, _ = call(capsys, "init", "mine", "--json")
+    status, out, _ = call(capsys, "init", "my_robot", "--json")
     template = Path(phonotaxis.__file__).parent / "template"
     assert status == 0
     for file in json.loads(out)["files"]:
-        original = template / Path(file).relative_to("mine")
+        original = template / Path(file).relative_to("my_robot")
         assert Path(file).read_text() == original.read_text()
     assert len(json.loads(out)["files"]) == 8
-    status, _, complaint = call(capsys, "init", "mine")
+    status, _, complaint = call(capsys, "init", "my_robot")
     assert status == 2
-    assert "mine cannot be written (File exists); name a new directory" in complaint
+    assert "my_robot cannot be written (File exists); name a new" in complaint
+
+
+def test_init_gives_a_project_the_name_of_its_directory(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = call(capsys, "init", "Ear-Bot", "--json")
+    files = [Path(file) for file in json.loads(out)["files"]]
+    assert status == 0
+    assert Path("Ear-Bot/ear_bot/laws.py") in files
+    assert 'name = "ear-bot"' in Path("Ear-Bot/pyproject.toml").read_text()
+    assert not [file for file in files if "my_robot" in file.read_text()]
+    for name in ("analysis", "2nd"):
+        status, _, complaint = call(capsys, "init", name)
+        assert (status, Path(name).exists()) == (2, False)
+        assert "write for example phonotaxis init my_robot" in complaint
 
 
 def test_version(capsys):

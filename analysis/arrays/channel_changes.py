@@ -247,7 +247,9 @@ def _jump_at(split: int, delays: ChannelDelays, search: LagSearch) -> _Jump | No
     alike = np.all(np.abs(steps - step) <= error[across])
     within = known & (first[i] == first[j])
     still = within.any() and np.all(stays[within])
-    if not (alike and still and whole) or significance < _DEVIATIONS:
+    # Some path of a near source explains any possible delays of three channels.
+    moved = count == 3 and np.all(np.abs(after[across]) <= search.allowed_s[across])
+    if moved or not (alike and still and whole) or significance < _DEVIATIONS:
         return None
     # A source that moves leaves the delays of the other channels by chance only.
     chance = float(np.median((error / search.allowed_s)[within])) ** (count - 2)

@@ -57,13 +57,14 @@ def _scenarios(options: Namespace, take: Take) -> Prepared[Printed]:
 def _scenario(name: str | None, copy: str | None) -> Prepared[Printed]:
     """Prints or copies the file of one scenario."""
     from analysis.report.provenance import SCHEMA_VERSION
-    from diagrams.scenario.loading import scenario_text
+    from diagrams.scenario.loading import load_scenario, scenario_text
     from systems.framework.input_error import InputError
 
     if name is None:
         raise InputError(
             "name", f"is missing; write phonotaxis scenarios default --copy {copy}"
         )
+    load_scenario(name)  # refuses faults of a user's file
     # The schema lies elsewhere for a copy.
     text = re.sub(r"^# yaml-language-server.*\n", "", scenario_text(name))
     document = {"schema_version": SCHEMA_VERSION, "scenario": name, "text": text}

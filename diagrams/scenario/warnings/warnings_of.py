@@ -30,10 +30,19 @@ def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
       robot's route.
     - The robot cannot come to rest with its gains, or can hit obstacles.
     - Obstacles at rest keep the robot away from its goal.
+    - A robot has gains of the user's own law, but another law.
     """
     found = [*angle_warnings(scenario)]
     for name, robot in scenario.robots.items():
         prefix = field_in("robots", name, "")
+        if robot.own_gains and not robot.own_code:
+            found.append(
+                ScenarioWarning(
+                    f"{prefix}own_gains.{next(iter(robot.own_gains))}",
+                    f"has no effect, because the law {robot.law!r} is not your own; "
+                    "runs that differ only in this gain are equal",
+                )
+            )
         if robot.own_guard is not None:
             found += (
                 ScenarioWarning(f"{prefix}{each.field}", each.complaint)

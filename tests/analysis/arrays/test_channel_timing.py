@@ -140,6 +140,24 @@ def test_one_sample_lost_at_48_khz_among_echoes():
     assert slipping_channels(still, found) is None
 
 
+@pytest.mark.parametrize("rate", [48_000.0, 100_000.0])
+@pytest.mark.parametrize("speed", [0.15, 0.3, 1.0])
+def test_a_source_that_drives_away_from_three_microphones(speed, rate):
+    """It sounds for 0.5 s, is silent for 1.5 s, and sounds again farther away."""
+    places = np.array([[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]])
+    geometry = ArrayGeometry(
+        microphones=tuple(map(tuple, places.tolist())), sound_speed=SOUND_SPEED
+    )
+    found = LagSearch.of(geometry.known, rate, None, range(3))
+    t_s = np.concatenate([begin + np.arange(0.04, 0.5, 0.08) for begin in (0.0, 2.0)])
+    source = np.column_stack([1.4 + speed * t_s, np.zeros(t_s.size)])
+    paths = np.linalg.norm(source[:, np.newaxis] - places, axis=2)
+    i, j = found.pairs.T
+    lags = (paths[:, j] - paths[:, i]) / found.c
+    delays = ChannelDelays(t_s, lags, np.zeros((t_s.size, 3)))
+    assert slipping_channels(delays, found) is None
+
+
 @pytest.mark.parametrize("count", [1, 2, 37, 1024])
 @pytest.mark.parametrize("k", [0, 1, 3])
 def test_lost_samples_are_counted_and_timed(count, k):

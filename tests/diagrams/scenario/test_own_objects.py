@@ -23,6 +23,7 @@ from diagrams.running.compiled.source import LoopPart
 from diagrams.scenario.own_code import import_own
 from diagrams.scenario.own_gains import default_gains, law_arguments
 from diagrams.scenario.own_objects import name_of
+from diagrams.scenario.warnings.warnings_of import warnings_of
 from phonotaxis import InputError, SweepPlan
 
 SHORT: dict[str, Any] = {"duration_s": 0.2, "hearing": "ideal"}
@@ -204,7 +205,8 @@ def test_gains_are_fields(own):
     again = load_scenario(scenario.with_({"own_gains.push_n": 2}).model_dump())
     assert again.follower.own_gains == {"push_n": 2.0}
     # Without own code, like gains of another law, they have no effect.
-    load_scenario("default", {"own_gains.push_n": 2.0})
+    (warning,) = warnings_of(load_scenario("default", {"own_gains.push_n": 2.0}))
+    assert "no effect, because the law 'active'" in str(warning)
 
 
 @pytest.mark.parametrize(
