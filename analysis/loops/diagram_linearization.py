@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from pydrake.systems.framework import System
+
 from analysis.loops.diagram_map import DiagramMap
 from analysis.loops.diagram_ports import find_signals
 from analysis.loops.diagram_timing import block_timings, common_period
@@ -57,10 +59,16 @@ def linearize(
         The model, its accuracy, and a list of what it does not describe.
 
     Raises:
-        InputError: A port is not known or not a vector, an input has no value, an
-            update begins later than one period after the context, or the diagram has
+        InputError: A port is not known or not a vector, an input that is used has no
+            value, an update begins later than one period after the context, or the diagram has
             no linear model, because a value is not finite.
     """
+    if not isinstance(diagram, System):
+        raise InputError(
+            "diagram",
+            f"is {diagram!r}, not a Drake system; for a scenario, use "
+            "phonotaxis.stability('default').state_space()",
+        )
     if context is None:
         context = diagram.CreateDefaultContext()
     try:
@@ -88,4 +96,9 @@ def linearize(
     mapped = DiagramMap(
         diagram, context, sources, sinks, timings, period, read_after=read_after
     )
-    return mapped.linearized(differences_only=differences_only)
+    try:
+        return mapped.linearized(differences_only=differences_only)
+    except RuntimeError as error:  # of Drake, for example an input without a value
+        raise InputError(
+            "context", f"Drake cannot compute the diagram here: {error}"
+        ) from error

@@ -67,5 +67,7 @@ def test_converted_block_moves_alike_and_carries_no_gradient():
 
 
 def test_impossible_path_is_refused_with_the_parameters():
-    with pytest.raises(ValidationError, match="doubles back at waypoint 1"):
-        SourceRobotParameters(waypoints_m=((0.0, 0.0), (1.0, 0.0), (0.5, 0.0)))
+    with pytest.raises(ValidationError, match="waypoint_times_s"):
+        SourceRobotParameters(
+            waypoints_m=((0.0, 0.0), (1.0, 0.0)), waypoint_times_s=(0.0, 0.1)
+        )
