@@ -60,8 +60,8 @@ def linearize(
 
     Raises:
         InputError: A port is not known or not a vector, an input that is used has no
-            value, an update begins later than one period after the context, or the diagram has
-            no linear model, because a value is not finite.
+            value, an update begins later than one period after the context, or the
+            diagram has no linear model, because a value is not finite.
     """
     if not isinstance(diagram, System):
         raise InputError(

@@ -269,6 +269,8 @@ def test_refusals_name_the_remedy():
     lag.set_name("lag")
     with pytest.raises(InputError, match="has no value; fix it"):
         linearize(lag)
+    with pytest.raises(InputError, match=r"InputPort\[0\] \(u0\) .* not connected"):
+        linearize(lag, inputs=())
     hold = blocks.ZeroOrderHold(0.1, 1, 5.0)
     context = hold.CreateDefaultContext()
     hold.get_input_port().FixValue(context, [0.0])
