@@ -179,6 +179,7 @@ def _find(source: str | Path) -> Path:
     known = "a name that 'phonotaxis scenarios' lists"
     if str(source) and path.is_dir():
         if (path / SCENARIO_FILE).is_file():
+            _require_one_run(path)
             return path / SCENARIO_FILE
         for below in sorted(path.glob(f"*/{SCENARIO_FILE}")):
             raise InputError(
@@ -210,6 +211,22 @@ def _find(source: str | Path) -> Path:
         "scenario",
         f"{str(source)!r} is not known; use {known}, or the path of a .yaml file{hint}",
     )
+
+
+def _require_one_run(path: Path) -> None:
+    """Rejects result directories whose scenario is not that of a run."""
+    if (path / "sweep.yaml").is_file():
+        raise InputError(
+            "scenario",
+            f"{path} has the runs of a sweep; its report.html lists commands that "
+            f"repeat runs, and {path / SCENARIO_FILE} is the scenario without changes",
+        )
+    if (path / "recommended.yaml").is_file():
+        raise InputError(
+            "scenario",
+            f"{path} is a result of design; choose phonotaxis simulate "
+            f"{path / 'recommended.yaml'} or {path / SCENARIO_FILE}",
+        )
 
 
 def read_mapping(path: Path) -> dict[str, Any]:

@@ -29,8 +29,7 @@ _PICTURES = (
 )
 _FIRST = "use 'phonotaxis simulate', which runs the default scenario"
 _PIP = "use pip; 'phonotaxis doctor' checks the installation"
-_CHECKED = "each command checks its input before it runs; see 'phonotaxis scenarios'"
-
+_CHECKED = "use 'phonotaxis scenarios FILE', which checks a file without a run"
 #: What to do instead of a command that does not exist. A text names the line to type.
 _NO_COMMANDS = {
     "plot": f"{_IN_RESULTS}, and 'phonotaxis simulate' writes a new one",
@@ -88,6 +87,10 @@ _NO_OPTIONS = {
     "verbose": "--debug prints the traceback of an error",
     "v": "--debug prints the traceback of an error; phonotaxis --version the version",
     "no-audio": "sound is written only with --save-audio DIR",
+    "ros": "--mcap writes a file of ROS 2 messages",
+    "last": "results/latest is the last result directory",
+    "validate": _CHECKED,
+    "check": _CHECKED,
     "realtime": "open replay.html of the result directory, which plays in real time",
     "list-devices": "'phonotaxis doctor' lists the sound cards",
 }

@@ -394,3 +394,18 @@ def test_control_characters_in_names_are_refused(letter):
     with pytest.raises(ValueError, match="control character"):
         SweepPlan(name=bad)
     assert load_scenario({"name": "\u00e9t\u00e9 \u0645 1"}).name
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("sweep.yaml", r"runs of a sweep; .*scenario\.yaml is the scenario"),
+        ("recommended.yaml", r"simulate .*recommended\.yaml or .*scenario\.yaml"),
+    ],
+)
+def test_results_of_many_runs_are_no_scenario(tmp_path, file, message):
+    (tmp_path / "scenario.yaml").write_text("seed: 3\n")
+    assert load_scenario(tmp_path).seed == 3
+    (tmp_path / file).touch()
+    with pytest.raises(InputError, match=message):
+        load_scenario(tmp_path)
