@@ -108,7 +108,7 @@ OWN_WORDS: dict[str, str | None] = {
     "simulate --movie x.avi": ".gif nor .mp4",
     "simulate --wav x.wav": "'--sound'",
     "simulate --csv out.csv": None,
-    "simulate --dry-run": "checks its input before it runs",
+    "simulate --dry-run": "phonotaxis scenarios FILE",
     "simulate --quiet": "--json",
     "simulate --guard": "--guard on|off",
     "simulate --set": "--set KEY=VALUE",
