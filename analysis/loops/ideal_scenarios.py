@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagrams.scenario.scenario import Scenario
+from systems.base.driven_path import DrivenPath
 from systems.base.parameters import PlantParameters
 from systems.framework.input_error import InputError
 from systems.world.paths import WaypointPath
@@ -42,7 +43,7 @@ def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
     return changed(scenario, {"source": source, "obstacles": obstacles})
 
 
-def _resting(path: WaypointPath, time_s: float) -> dict[str, Any]:
+def _resting(path: DrivenPath | WaypointPath, time_s: float) -> dict[str, Any]:
     """Fields of a body that rests where its path is at a time."""
     x, y, theta = path.pose(time_s)
     return {
