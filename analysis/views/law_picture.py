@@ -11,10 +11,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
 
 from analysis.report.body_labels import BodyLabel, spread_labels
 from analysis.report.palette import COLORS, ROBOT_COLORS, draw_grid
+from analysis.report.shape_patch import shape_patch
 from analysis.views.framing import picture_times, tick_at
 from analysis.views.picture import draw_scene, map_axes
 from analysis.views.scene import (
@@ -30,7 +30,7 @@ from analysis.views.scene import (
     make_scene,
 )
 from diagrams import RunResult
-from systems.world.geometry import rectangle_corners
+from systems.world.shapes import box
 
 #: Styles of the paths, one after another for each round of the colors.
 _LINES = ("-", "--", "-.", ":")
@@ -145,8 +145,9 @@ def _draw_robots(
     """Draws the outlines of the robots at a tick, with a text beside them."""
     for body in _bodies(result, tick):
         axes.add_patch(
-            Polygon(
-                rectangle_corners(body),
+            shape_patch(
+                box((float(body[3]), float(body[4]))),
+                body[:3],
                 facecolor=(*to_rgb(color), 0.10),
                 edgecolor=color,
                 gid="robot",
