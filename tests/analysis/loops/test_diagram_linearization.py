@@ -38,7 +38,9 @@ class Loop:
         self.blocks: list[tuple[str, Any]] = []
         systems = []
         for number in range(rng.integers(2, 5)):
-            kind = "flow" if number == 0 else rng.choice(["flow", "sampled", "hold"])
+            # The first block flows, and the second one has a rate of its own.
+            kinds = [["flow"], ["sampled", "hold"], ["flow", "sampled", "hold"]]
+            kind = rng.choice(kinds[min(number, 2)])
             count = int(rng.integers(1, 4))
             A = rng.normal(size=(count, count))
             B, C = rng.normal(size=(count, 1)), rng.normal(size=(1, count))
@@ -117,8 +119,7 @@ def test_random_diagrams_with_several_rates_and_offsets(seed):
     context = loop.diagram.CreateDefaultContext()
     loop.diagram.get_input_port().FixValue(context, [0.3])
     found = linearize(loop.diagram, context)
-    if found.model.period_s is None:
-        return
+    assert found.model.period_s is not None
     expected = loop.matrices(found.model.period_s)
     for name, matrix in zip("ABCD", expected, strict=True):
         assert getattr(found.model, name) == pytest.approx(matrix, rel=1e-7, abs=1e-8)
