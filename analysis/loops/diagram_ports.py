@@ -89,7 +89,7 @@ def find_signals(system: Any, wanted: Sequence[Any] | None, kind: Kind) -> list[
         InputError: A name is not known, or the port is abstract.
     """
     if wanted is None:
-        own = _ports(system, kind)
+        own = ports_of(system, kind)
         return [_signal("", (), port, kind) for port in own if _is_vector(port)]
     if isinstance(wanted, str):
         wanted = [wanted]
@@ -164,7 +164,8 @@ def _signal(prefix: str, where: tuple[int, ...], port: Any, kind: Kind) -> Signa
     return Signal(name, where, int(port.get_index()), int(port.size()), kind)
 
 
-def _ports(system: Any, kind: Kind) -> list[Any]:
+def ports_of(system: Any, kind: Kind) -> list[Any]:
+    """Returns the input or output ports of a Drake system, in order."""
     if kind == "input":
         return [system.get_input_port(k) for k in range(system.num_input_ports())]
     return [system.get_output_port(k) for k in range(system.num_output_ports())]
@@ -173,7 +174,7 @@ def _ports(system: Any, kind: Kind) -> list[Any]:
 def _all_ports(
     system: Any, kind: Kind, where: tuple[int, ...] = (), prefix: str = ""
 ) -> Iterator[tuple[str, tuple[tuple[int, ...], Any]]]:
-    for port in _ports(system, kind):
+    for port in ports_of(system, kind):
         name = port.get_name()
         yield (f"{prefix}.{name}" if prefix else name), (where, port)
     for index, part in enumerate(
