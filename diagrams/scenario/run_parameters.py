@@ -74,7 +74,7 @@ class RunParameters(Parameters):
     arena_m: Size = (7.0, 7.0)
     """Extents of the floor in pictures, m; the arena has no walls."""
     obstacles: Annotated[
-        tuple[ObstacleParameters, ...], Strict(False), Field(max_length=100)
+        tuple[ObstacleParameters, ...], Strict(False), Field(max_length=1_000)
     ] = ()
     stop: StopParameters = StopParameters()
     sound_speed_m_s: SoundSpeed = SOUND_SPEED_M_S
