@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.batches.plan import SweepPlan
     from analysis.loops.diagram_linearization import linearize
+    from analysis.loops.given_delays import delay_margin
     from analysis.loops.given_loops import disk_margin, loop_at, margins
     from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
@@ -75,6 +76,7 @@ __all__ = [
     "columns",
     "compare",
     "design",
+    "delay_margin",
     "disk_margin",
     "laws",
     "library_scenarios",
@@ -126,6 +128,7 @@ _HOMES = {
     "columns": "analysis.runs.columns",
     "compare": "phonotaxis.batches",
     "design": "phonotaxis.loops",
+    "delay_margin": "analysis.loops.given_delays",
     "disk_margin": "analysis.loops.given_loops",
     "laws": "phonotaxis.listings",
     "loop_at": "analysis.loops.given_loops",

@@ -63,6 +63,28 @@ def linearize(
             value, an update begins later than one period after the context, or the
             diagram has no linear model, because a value is not finite.
     """
+    mapped = map_over_period(
+        diagram, context, inputs, outputs, period_s=period_s, read_after=read_after
+    )
+    return linearized(mapped, differences_only=differences_only)
+
+
+def map_over_period(
+    diagram: Any,
+    context: Any,
+    inputs: Sequence[Any] | None,
+    outputs: Sequence[Any] | None,
+    *,
+    period_s: float | None = None,
+    read_after: bool = False,
+    older_for_s: float | None = None,
+) -> DiagramMap:
+    """Prepares the map that ``linearize`` differentiates; the arguments are the same.
+
+    With ``older_for_s``, the map has each input twice: first the value that the diagram
+    receives in the first ``older_for_s`` seconds of the period, and then the value that
+    it receives in the rest.
+    """
     if not isinstance(diagram, System):
         raise InputError(
             "diagram",
@@ -93,9 +115,22 @@ def linearize(
             "state period_s, after which all updates repeat",
         )
     period = period_s or (common_period(timings) if timings else None)
-    mapped = DiagramMap(
-        diagram, context, sources, sinks, timings, period, read_after=read_after
+    return DiagramMap(
+        diagram,
+        context,
+        sources,
+        sinks,
+        timings,
+        period,
+        read_after=read_after,
+        older_for_s=older_for_s,
     )
+
+
+def linearized(
+    mapped: DiagramMap, *, differences_only: bool = False
+) -> LinearizedDiagram:
+    """Differentiates the map; errors of Drake become an ``InputError``."""
     try:
         return mapped.linearized(differences_only=differences_only)
     except RuntimeError as error:  # of Drake, for example an input without a value

@@ -47,8 +47,9 @@ class DiagramMap:
         period_s: float | None,
         *,
         read_after: bool = False,
+        older_for_s: float | None = None,
     ) -> None:
-        self.read_after = read_after
+        self.read_after, self.older_for_s = read_after, older_for_s
         self.diagram, self.context, self.period_s = diagram, context, period_s
         self.sources, self.sinks = sources, sinks
         self.state = get_state(context)
@@ -67,8 +68,9 @@ class DiagramMap:
 
     @property
     def point(self) -> NDArray[np.float64]:
-        """(n + m,) state, followed by the inputs."""
-        return np.concatenate([self.state, *self.values])
+        """(n + m,) state, followed by the inputs; with ``older_for_s``, twice."""
+        values = self.values if self.older_for_s is None else self.values * 2
+        return np.concatenate([self.state, *values])
 
     def linearized(self, *, differences_only: bool) -> LinearizedDiagram:
         """Computes the model in both ways, if possible."""
@@ -112,10 +114,8 @@ class DiagramMap:
     def _map(self, simulator: Any, point: Any) -> Any:
         """Returns the next state and the outputs; ``point`` may be AutoDiffXd."""
         system, context = simulator.get_system(), simulator.get_mutable_context()
-        start = count = len(self.state)
-        for signal, value in zip(self.sources, self.values, strict=True):
-            signal.fix(system, context, point[start : start + len(value)])
-            start += len(value)
+        count = len(self.state)
+        later = self._fix(system, context, point, count)
         context.SetTime(self.start_s)
         set_state(context, point[:count])
         if self.period_s is None:
@@ -131,8 +131,21 @@ class DiagramMap:
         if self.read_after:
             simulator.AdvancePendingEvents()
         outputs = [signal.eval(system, context) for signal in self.sinks]
+        if self.older_for_s is not None:
+            simulator.AdvanceTo(self.start_s + self.older_for_s)
+            self._fix(system, context, point, later)
         simulator.AdvanceTo(self.end_s)
         return np.concatenate([get_state(context), *outputs])
+
+    def _fix(self, system: Any, context: Any, point: Any, start: int) -> int:
+        """Sets the inputs to the elements of ``point`` from ``start`` on.
+
+        Returns the index after these elements.
+        """
+        for signal, value in zip(self.sources, self.values, strict=True):
+            signal.fix(system, context, point[start : start + len(value)])
+            start += len(value)
+        return start
 
     def _simulator(self, system: Any, scalar: type) -> Any:
         """Prepares a simulation of the diagram, or of its AutoDiffXd twin."""
@@ -243,7 +256,11 @@ class DiagramMap:
         return (*continuous, *discrete)
 
     def _columns(self) -> list[str]:
-        return [*self._states(), *_elements(self.sources)]
+        inputs = _elements(self.sources)
+        if self.older_for_s is None:
+            return [*self._states(), *inputs]
+        older = [f"{name}_older" for name in inputs]
+        return [*self._states(), *older, *inputs]
 
     def _rows(self) -> list[str]:
         return [*self._states(), *_elements(self.sinks)]

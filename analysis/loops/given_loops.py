@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,23 @@ def loop_at(diagram: Any, context: Any, port: Any) -> LinearModel:
             output port of the diagram.
         InputError: The signal at the port changes within the period of the diagram.
     """
+    return opened_loop(diagram, context, port).model
+
+
+class OpenedLoop(NamedTuple):
+    """Loop of a diagram that is opened at one input port."""
+
+    model: LinearModel
+    """Loop transfer function for negative feedback."""
+    source: Any
+    """Output port that feeds the input port."""
+    read_after: bool
+    """Whether the port receives the signal as it is after the updates that begin a
+    period, as a continuous block does, and not before, as a sampled block does."""
+
+
+def opened_loop(diagram: Any, context: Any, port: Any) -> OpenedLoop:
+    """Opens a loop as ``loop_at`` does, and tells how the port receives the signal."""
     source = find_source(diagram, port)
     closed = linearize(diagram, context, inputs=(), outputs=()).model
     # A continuous block receives the signal as it is after the updates, and a sampled
@@ -57,7 +74,8 @@ def loop_at(diagram: Any, context: Any, port: Any) -> LinearModel:
         ).model
         if _closes_to(model, closed):
             name = port if isinstance(port, str) else port.get_name()
-            return replace(model, name=f"loop at {name}", C=-model.C, D=-model.D)
+            loop = replace(model, name=f"loop at {name}", C=-model.C, D=-model.D)
+            return OpenedLoop(loop, source, read_after)
     raise InputError(
         "port",
         f"the signal at {port!r} changes within {model.period_s:g} s, the period of "
@@ -93,7 +111,7 @@ def margins(loop: Any) -> LoopMargins:
     Raises:
         InputError: ``loop`` is not a model, or has several inputs or outputs.
     """
-    return loop_margins(_model(loop))
+    return loop_margins(loop_model(loop))
 
 
 def disk_margin(loop: Any, skew: float = 0.0) -> MultiloopDiskMargin:
@@ -114,10 +132,10 @@ def disk_margin(loop: Any, skew: float = 0.0) -> MultiloopDiskMargin:
     """
     if not -1.0 <= skew <= 1.0:
         raise InputError("skew", f"is {skew:g}; give a number from -1 to 1")
-    return multiloop_disk_margin(_model(loop), skew)
+    return multiloop_disk_margin(loop_model(loop), skew)
 
 
-def _model(loop: Any) -> LinearModel:
+def loop_model(loop: Any) -> LinearModel:
     """Converts a model of any accepted type."""
     if isinstance(loop, LinearModel):
         return loop

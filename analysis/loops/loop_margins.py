@@ -146,6 +146,9 @@ class LoopMargins:
     """Delay margin, s: smallest ratio of phase lag, rad, to frequency, rad/s, over all
     gain crossovers. The value is exact for continuous loops. Module
     ``analysis.loops.delay_margin`` computes the exact value for sampled loops."""
+    delay_frequency_rad_s: float = math.nan
+    """Gain crossover that determines the delay margin, rad/s. Without a crossover:
+    NaN."""
     modulus_margin: float = 0.0
     """Smallest distance of L from -1 over all frequencies."""
     modulus_frequency_rad_s: float = math.nan
@@ -233,7 +236,7 @@ def loop_margins(model: LinearModel) -> LoopMargins:
         return LoopMargins(model.name, model)
     omega = _grid(model, SEARCH_POINTS)
     upper, lower = _gain_margins(model, T, omega)
-    lag, lead, crossover, delay = _phase_margins(model, T, omega)
+    lag, lead, crossover, delay, late = _phase_margins(model, T, omega)
     # S = 1 - T. The size of the disk is the smallest 1/|S + (skew - 1)/2|.
     peaks = [peak(T, (1.0 + skew) / 2.0) for skew in SKEWS]
     disks = tuple(
@@ -251,6 +254,7 @@ def loop_margins(model: LinearModel) -> LoopMargins:
         phase_lead_margin_deg=math.degrees(lead),
         crossover_rad_s=crossover,
         delay_margin_s=delay,
+        delay_frequency_rad_s=late,
         modulus_margin=1.0 / largest_S,
         modulus_frequency_rad_s=where,
         sensitivity_peak=largest_S,
@@ -300,26 +304,28 @@ def _gain_margins(
 
 def _phase_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
-) -> tuple[float, float, float, float]:
-    """Margins of phase lag, rad, and phase lead, rad, crossover, rad/s, and delay, s.
+) -> tuple[float, float, float, float, float]:
+    """Margins of phase lag and phase lead, rad, crossover, rad/s, delay, s, and its
+    crossover, rad/s.
 
-    The crossover is that of the smaller of both phase margins.
+    The first crossover is that of the smaller of both phase margins.
     """
     # |L| = 1 where the real part of T is 1/2.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))
     at = crossings(found, lambda w: np.abs(model.response(w)[0, 0]) - 1.0)
-    lag, lead, where, delay = math.inf, math.inf, math.nan, math.inf
+    lag, lead, where, delay, late = math.inf, math.inf, math.nan, math.inf, math.nan
     for w, L in zip(at, model.response(at)[0, 0] if at else (), strict=True):
         behind = float(np.angle(-L)) % math.tau  # lag that turns L to -1
         ahead = math.tau - behind
         if min(behind, ahead) < min(lag, lead):
             where = w
         lag, lead = min(lag, behind), min(lead, ahead)
-        delay = min(delay, behind / w)
+        if behind / w < delay:
+            delay, late = behind / w, w
     if not model.period_s and abs(model.D[0, 0]) >= 1.0:
         # |L| stays at 1 or above at high frequencies, where any delay destabilizes.
-        delay = 0.0
-    return lag, lead, where, delay
+        delay, late = 0.0, math.inf
+    return lag, lead, where, delay, late
 
 
 @dataclass(frozen=True)
