@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.batches.plan import SweepPlan
     from analysis.loops.diagram_linearization import linearize
+    from analysis.loops.given_bursts import loop_burst_cycle
     from analysis.loops.given_delays import delay_margin
     from analysis.loops.given_loops import disk_margin, loop_at, margins
+    from analysis.loops.given_oscillations import describing_function
     from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
@@ -75,8 +77,9 @@ __all__ = [
     "calibrate_delays",
     "columns",
     "compare",
-    "design",
     "delay_margin",
+    "describing_function",
+    "design",
     "disk_margin",
     "laws",
     "library_scenarios",
@@ -86,6 +89,7 @@ __all__ = [
     "locate",
     "locate_delays",
     "loop_at",
+    "loop_burst_cycle",
     "main",
     "margins",
     "scenarios",
@@ -129,6 +133,8 @@ _HOMES = {
     "compare": "phonotaxis.batches",
     "design": "phonotaxis.loops",
     "delay_margin": "analysis.loops.given_delays",
+    "describing_function": "analysis.loops.given_oscillations",
+    "loop_burst_cycle": "analysis.loops.given_bursts",
     "disk_margin": "analysis.loops.given_loops",
     "laws": "phonotaxis.listings",
     "loop_at": "analysis.loops.given_loops",

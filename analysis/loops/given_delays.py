@@ -147,7 +147,7 @@ def _model_step(model: LinearModel, part: float = 0.0) -> _Step:
 def _diagram_step(
     diagram: Any, context: Any, port: Any, opened: OpenedLoop, part: float
 ) -> _Step:
-    """Simulates the diagram over one period whose input changes after ``part`` of it."""
+    """Simulates one period of the diagram whose input changes after ``part`` of it."""
     if part == 0.0:
         return _model_step(opened.model)
     mapped = map_over_period(

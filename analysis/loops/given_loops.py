@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -14,10 +15,17 @@ from analysis.loops.linear_models import LinearModel
 from analysis.loops.linearized_diagram import LinearizedDiagram
 from analysis.loops.loop_margins import LoopMargins, loop_margins
 from analysis.loops.multiloop_disk import MultiloopDiskMargin, multiloop_disk_margin
+from analysis.loops.response_margins import (
+    delayed_response,
+    measured_response,
+    response_margins,
+)
 from systems.framework.input_error import InputError
 
 #: Largest relative difference between equal matrices.
 _SAME = 1e-6
+#: Largest distance of a number of periods from a whole number.
+_WHOLE = 1e-6
 #: Condition number above which a loop has no unique signals.
 _SINGULAR = 1e12
 
@@ -97,21 +105,78 @@ def _size(matrix: NDArray[np.float64]) -> float:
     return max(1.0, float(np.abs(matrix).max(initial=0.0)))
 
 
-def margins(loop: Any) -> LoopMargins:
+def margins(loop: Any, *, delay_s: float = 0.0, unstable_poles: int = 0) -> LoopMargins:
     """Computes the stability margins of a loop with negative feedback.
 
     Args:
         loop: Loop transfer function L with one input and one output: a
             ``control.StateSpace`` or ``control.TransferFunction``, continuous or
-            sampled, or the result of ``loop_at`` or ``linearize``.
+            sampled; a ``control.FrequencyResponseData``; or the result of ``loop_at``
+            or ``linearize``.
+        delay_s: Pure delay of the loop in addition to that of ``loop``, s, >= 0. In a
+            sampled loop, it is a whole number of periods.
+        unstable_poles: Number of growing poles of L. It is needed only for frequency
+            responses, which do not tell it.
 
     Returns:
-        Gain, phase, delay, modulus and disk margins, and peaks of S and T.
+        Gain, phase, delay, modulus and disk margins, and peaks of S and T. Those of a
+        frequency response hold for its interpolation between the given frequencies.
 
     Raises:
         InputError: ``loop`` is not a model, or has several inputs or outputs.
+        InputError: A frequency response has too few points, or does not decide whether
+            the closed loop is stable.
+        InputError: The delay is negative, or no whole number of periods.
     """
-    return loop_margins(loop_model(loop))
+    from control import FrequencyResponseData
+
+    if not 0.0 <= delay_s < math.inf:
+        raise InputError("delay_s", f"is {delay_s:g}; give a time of 0 or more, in s")
+    if isinstance(loop, FrequencyResponseData):
+        given, stable = measured_response(loop, unstable_poles, delay_s)
+        return response_margins(given, stable=stable)
+    model = loop_model(loop)
+    if not delay_s:
+        return loop_margins(model)
+    if model.period_s:
+        return loop_margins(delayed_model(model, delay_s))
+    given, stable = delayed_response(model, delay_s)
+    return response_margins(given, stable=stable)
+
+
+def delayed_model(model: LinearModel, delay_s: float) -> LinearModel:
+    """Adds a delay of whole periods to the output of a sampled model.
+
+    Raises InputError for any other delay.
+    """
+    periods = delay_s / (model.period_s or 1.0)
+    count = round(periods)
+    if abs(periods - count) > _WHOLE:
+        raise InputError(
+            "delay_s",
+            f"is {periods:.4g} periods of {model.period_s:g} s; a sampled model has no "
+            "motion between two samples: give a multiple of the period, or a diagram "
+            "and a port to delay_margin",
+        )
+    if count == 0:
+        return model
+    n = len(model.A)
+    A: NDArray[np.float64] = np.zeros((n + count, n + count))
+    A[:n, :n], A[n, :n] = model.A, model.C[0]
+    A[n + 1 :, n:-1] = np.eye(count - 1)
+    B = np.zeros((n + count, 1))
+    B[:n], B[n] = model.B, model.D[0]
+    C = np.zeros((1, n + count))
+    C[0, -1] = 1.0
+    late = tuple(f"late_{k + 1}" for k in range(count))
+    return replace(
+        model,
+        A=A,
+        B=B,
+        C=C,
+        D=np.zeros((1, 1)),
+        state_names=(*model.state_names, *late),
+    )
 
 
 def disk_margin(loop: Any, skew: float = 0.0) -> MultiloopDiskMargin:

@@ -125,8 +125,9 @@ class LoopMargins:
 
     name: str
     """Name of the loop."""
-    model: LinearModel = field(repr=False)
-    """Loop transfer function L."""
+    model: LinearModel | FrequencyResponse = field(repr=False)
+    """Loop transfer function L. It is a frequency response if the loop was given as
+    one, or has a pure delay."""
     stable: bool = False
     """Whether the closed loop is stable."""
     gain_increase_margin: float = 1.0
@@ -165,6 +166,8 @@ class LoopMargins:
     @cached_property
     def response(self) -> FrequencyResponse:
         """Frequency response with enough points for figures."""
+        if isinstance(self.model, FrequencyResponse):
+            return self.model
         return frequency_response(self.model)
 
     @property
@@ -305,10 +308,10 @@ def _gain_margins(
 def _phase_margins(
     model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float, float, float, float]:
-    """Margins of phase lag and phase lead, rad, crossover, rad/s, delay, s, and its
-    crossover, rad/s.
+    """Margins of phase lag, phase lead and delay, with the crossovers behind them.
 
-    The first crossover is that of the smaller of both phase margins.
+    In this order: phase lag, rad, phase lead, rad, crossover of the smaller of both,
+    rad/s, delay, s, and its crossover, rad/s.
     """
     # |L| = 1 where the real part of T is 1/2.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))

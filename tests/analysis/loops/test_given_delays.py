@@ -107,7 +107,7 @@ def test_a_sampled_block_reads_whole_periods():
     found = phonotaxis.delay_margin(integrator_loop(2.0, 0.2), port="hold.u")
     assert found.whole_periods
     # Levin and May with a = 0.4.
-    limit = next(d for d in range(9) if 0.4 >= 2 * math.cos(d * math.pi / (2 * d + 1)))
+    limit = next(d for d in range(9) if 2 * math.cos(d * math.pi / (2 * d + 1)) <= 0.4)
     assert found.delay_s == pytest.approx(0.2 * limit)
 
 
