@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -51,9 +52,14 @@ class SampledLoop:
     motion along the line to the source. None if this margin is infinite or missing."""
 
     @property
+    def least(self) -> DelayMargin | None:
+        """The smallest delay margin; None if there are none."""
+        return min(self.margins, key=attrgetter("delay_s"), default=None)
+
+    @property
     def least_s(self) -> float:
-        """Least of the delay margins, s. NaN if there are none."""
-        return min((margin.delay_s for margin in self.margins), default=math.nan)
+        """The smallest delay margin, s. NaN if there are none."""
+        return self.least.delay_s if self.least else math.nan
 
 
 @dataclass(frozen=True)
@@ -157,6 +163,9 @@ DELAY_MARGINS = Part[SampledLoop](
             "less added delay than the threshold makes it oscillate",
             "set by this project; exact margin of the sampled loop",
             lambda data: data.least_s,
+            lambda data: (
+                f"at the {data.least.at}, {data.least.direction}" if data.least else ""
+            ),
         ),
     ),
     document=_sampled_document,
@@ -228,6 +237,7 @@ BURST_CYCLE = Part[BurstCycles](
             "it swings ever farther because the source is silent most of the time",
             "stability over a cycle of the sound",
             lambda data: next(c.largest for c in data.cycles if c.hold == data.today),
+            lambda data: f"hold `{data.today}`",
         ),
     ),
     document=_burst_document,
