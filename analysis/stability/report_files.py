@@ -162,11 +162,12 @@ def _narrow(table: Table) -> Iterator[Content]:
         if any(isinstance(cell, Judged) and cell.verdict == "fail" for cell in row)
     ]
     if failed:
-        yield "What the failures mean:"
+        yield "Why criteria fail:"
         yield Bullets(failed)
 
 
 def _summary(analyses: Sequence[LawAnalysis], *, narrow: bool = False) -> Section:
+    """Returns the summary of the report; ``narrow`` is the form for a terminal."""
     sheet, table = analyses[0].sheet, verdict_table(analyses)
     notes = [
         note if len(analyses) == 1 else f"{law_title(analysis.law)}: {note}"
@@ -174,12 +175,15 @@ def _summary(analyses: Sequence[LawAnalysis], *, narrow: bool = False) -> Sectio
         for note in analysis.notes
     ]
     before: list[Content] = ["Before you use the numbers:", Bullets(notes)]
+    origin = [
+        ("Seed", str(sheet.seed)),
+        ("Versions", ", ".join(f"{k} {v}" for k, v in sheet.versions.items())),
+    ]
     contents: list[Content] = [
         Definitions(
             [
                 ("Scenario", f"{sheet.scenario}: {sheet.description}"),
-                ("Seed", str(sheet.seed)),
-                ("Versions", ", ".join(f"{k} {v}" for k, v in sheet.versions.items())),
+                *([] if narrow else origin),
             ]
         ),
         Bullets([_count(analysis) for analysis in analyses]),

@@ -107,7 +107,7 @@ def test_page_shows_a_law_and_the_table_both(analyses):
         "trajectory_filtered",
     ]
     assert len({len(row) for row in rows}) == 1
-    failures = blocks[blocks.index("What the failures mean:") + 1]
+    failures = blocks[blocks.index("Why criteria fail:") + 1]
     assert "- chain amplification in contact: " in failures
 
 
