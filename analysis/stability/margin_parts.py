@@ -310,8 +310,8 @@ MARGINS = Part[Margins](
         *margin_criteria(_all_cuts),
         Criterion(
             "least disk margin", "", "at least", REQUIRED.disk_margin,
-            "gain and phase may change at once, by 6 dB and 37 deg",
-            "a change of gain and phase at once makes the loop oscillate early",
+            "gain and phase may change at once; alone, by 6 dB or by 37 deg",
+            "a small change of gain and phase at once makes the loop oscillate",
             "alpha = 2/3: 6 dB in each direction (Seiler, Packard and Gahinet 2020)",
             *_worst(min, attrgetter("disk.alpha"), _all_cuts),
         ),

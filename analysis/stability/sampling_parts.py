@@ -111,11 +111,11 @@ def _sampled_document(data: SampledLoop) -> dict[str, Any]:
 def _show_sampled(data: SampledLoop) -> list[Content]:
     contents: list[Content] = [
         (
-            "A delay margin is the delay that may be added before the loop oscillates, "
-            "in fractions of a tick. It comes from bisection on the spectral radius of "
-            "the one-period map with that delay. A delay at the sensor makes an "
-            "estimate later than the tracker assumes; a delay at the wheels makes a "
-            "command later."
+            "A delay margin is the smallest additional delay with which the loop is no "
+            "longer stable. It need not be a whole number of ticks. It comes from "
+            "bisection on the spectral radius of the one-period map with that delay. A "
+            "delay at the sensor makes an estimate later than the tracker assumes; a "
+            "delay at the wheels makes a command later."
         ),
         Table.of(
             data.margins,
@@ -291,11 +291,11 @@ def _show_contact(data: ContactMode) -> list[Content]:
     ]
     return [
         (
-            "Before an obstacle the law's spring adds to K_r, while the damping is "
-            "still D_r. The table lists the largest springs with which the robot comes "
-            "to rest, over the motors' lag and the age of an echo (in ticks of "
-            f"{limits.tick_s * 1e3:g} ms). This scenario has {lag:g} s and {ticks} "
-            "ticks."
+            "In front of an obstacle, the stiffness of the law adds to K_r, and the "
+            "damping is D_r. The table lists the largest stiffness of a law with which "
+            "the robot comes to rest, for several motor lags and ages of the echoes "
+            f"(in ticks of {limits.tick_s * 1e3:g} ms). In this scenario, the motor "
+            f"lag is {lag:g} s, and echoes are {ticks} ticks old."
         ),
         Table(
             [Column("motor lag", "s"), *(f"{t} ticks" for t in limits.latency_ticks)],
@@ -316,8 +316,8 @@ CONTACT_MODE = Part[ContactMode](
     criteria=(
         Criterion(
             "growth where the law is stiffest", "1/s", "below", 0.0,
-            "it comes to rest however hard it presses against an obstacle",
-            "it swings where it presses to the law's stiffest point",
+            "it comes to rest in front of an obstacle, even where the law is stiffest",
+            "it swings in front of an obstacle, where the law is stiffest",
             "stability of the contact mode at the law's largest slope",
             lambda data: _of_push(data.growth_per_s),
         ),
