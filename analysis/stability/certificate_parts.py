@@ -104,8 +104,8 @@ def _show_balance(data: EnergyBalance) -> list[Content]:
     return [
         (
             "The velocity term adds energy when it pushes along the motion. The loop "
-            "is passive where the attraction's damping takes at least as much energy "
-            "at every speed."
+            "is passive if the damping of the attraction removes at least as much "
+            "energy at every speed."
         ),
         fact_table(plain(data)),
         Figure(
