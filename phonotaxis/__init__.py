@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     )
     from phonotaxis.result import Result
     from phonotaxis.runs import RunResult, simulate
+    from phonotaxis.saved_runs import load_run
     from systems.framework.input_error import InputError
 
 __all__ = [
@@ -85,6 +86,7 @@ __all__ = [
     "library_scenarios",
     "linearize",
     "listen",
+    "load_run",
     "load_scenario",
     "locate",
     "locate_delays",
@@ -142,6 +144,7 @@ _HOMES = {
     "library_scenarios": "diagrams.scenario.loading",
     "linearize": "analysis.loops.diagram_linearization",
     "listen": "phonotaxis.listening",
+    "load_run": "phonotaxis.saved_runs",
     "load_scenario": "diagrams.scenario.loading",
     "locate": "phonotaxis.recordings",
     "scenarios": "phonotaxis.listings",

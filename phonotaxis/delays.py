@@ -1,4 +1,4 @@
-"""What measured delays between microphones tell: sources, and the array itself."""
+"""Sources and arrays that follow from measured delays between microphones."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class StabilityResult(Result):
         return stability_document(self.analyses)
 
     def __str__(self) -> str:
-        """Verdicts on the stability, for a terminal."""
+        """Summary of the report, for a terminal."""
         return stability_text(self.analyses)
 
     @property

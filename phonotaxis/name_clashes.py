@@ -43,7 +43,7 @@ def refuse_clashes() -> None:
 
 
 def explain_hidden_modules() -> None:
-    """Makes Python name a module of the user that a package of phonotaxis hides.
+    """Adds the name of a user's module that a package of phonotaxis hides to errors.
 
     The message appears where the import of the user's module fails.
     """

@@ -1,4 +1,4 @@
-"""What recordings of a microphone array tell: sources, and the array itself."""
+"""Sources and arrays that follow from recordings of a microphone array."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class CalibrationResult(Result):
         return calibration_document(self.run)
 
     def __str__(self) -> str:
-        """What the sounds made better known, for a terminal."""
+        """How much better the array is known than before, for a terminal."""
         return calibration_text(self.run)
 
     @property

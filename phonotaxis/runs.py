@@ -35,8 +35,8 @@ class RunResult(diagrams.RunResult, Result):
     audio: dict[str, Any] | None = None
     """Directory of the saved sound, and the contents of its files; None if no sound was
     saved."""
-    movie: str | None = None
-    """File of the movie; None if no movie was written."""
+    movie_file: str | None = None
+    """File of the movie that the run wrote; None if it wrote no movie."""
 
     @classmethod
     def of(cls, result: diagrams.RunResult) -> RunResult:
@@ -56,7 +56,7 @@ class RunResult(diagrams.RunResult, Result):
         """Returns the JSON document of ``phonotaxis simulate``."""
         from analysis.runs.run_report import run_document
 
-        files = {"audio": self.audio, "movie": self.movie}
+        files = {"audio": self.audio, "movie": self.movie_file}
         given = {name: value for name, value in files.items() if value is not None}
         return {**run_document(self), **given}
 
@@ -67,8 +67,8 @@ class RunResult(diagrams.RunResult, Result):
         lines = [run_text(self, self.document())]
         if self.audio is not None:
             lines.append(f"{'sound':<21} {self.audio['directory']}")
-        if self.movie is not None:
-            lines.append(f"{'movie':<21} {self.movie}")
+        if self.movie_file is not None:
+            lines.append(f"{'movie':<21} {self.movie_file}")
         return "\n".join(lines)
 
     @property
@@ -135,6 +135,25 @@ class RunResult(diagrams.RunResult, Result):
         from analysis.views.replay import write_replay
 
         write_replay(self, path)
+        return Path(path)
+
+    def movie(self, path: str | Path) -> Path:
+        """Writes a silent movie of the run from above.
+
+        The argument ``movie`` of ``simulate`` writes a movie with the sound that the
+        first robot heard.
+
+        Args:
+            path: New .gif or .mp4 file.
+
+        Returns:
+            Path of the file.
+
+        Raises:
+            InputError: The file cannot be made, or no encoder for it is installed.
+            RunError: The encoder failed, or the file could not be written.
+        """
+        SavedMovie(path, self.full_scenario).write(self, None, lambda: None)
         return Path(path)
 
     def to_mcap(self, path: str | Path) -> Path:
@@ -344,7 +363,7 @@ def prepare_simulation(
         return replace(
             result,
             audio=saved.facts() if saved else None,
-            movie=movie.shown if movie else None,
+            movie_file=movie.shown if movie else None,
         )
 
     return Prepared(

@@ -112,6 +112,11 @@ def test_a_result_runs_again_and_is_listed(capsys, tmp_path, monkeypatch):
     listed = json.loads(call(capsys, "results", "--json")[1])["results"]
     assert [each["out"] for each in listed] == ["results/0001", "results/0002"]
     assert all("default" in each["title"] for each in listed)
+    Path("results/0001").rename("mine")
+    for given in ("mine", "."):
+        listed = json.loads(call(capsys, "results", given, "--json")[1])["results"]
+        assert [each["out"] for each in listed] == ["mine"]
+    assert "dir: 'none' has no results" in call(capsys, "results", "none")[2]
 
 
 def test_laws_are_named_in_any_way():

@@ -96,7 +96,7 @@ def test_settings_may_be_a_mapping():
 def test_a_run_is_that_of_the_diagrams(run: phonotaxis.RunResult):
     ours = diagrams.simulate(run.scenario)
     own = {each.name for each in fields(run)} - {each.name for each in fields(ours)}
-    assert own == {"audio", "movie"}
+    assert own == {"audio", "movie_file"}
     assert run.trajectory.equals(ours.trajectory)
     assert run.ending == ours.ending
 
@@ -160,6 +160,16 @@ def test_a_run_saves_its_sound_and_a_movie(tmp_path: Path):
     assert (tmp_path / "ears" / "heard.wav").is_file()
     with pytest.raises(phonotaxis.InputError, match=r"save_audio: .*not empty"):
         phonotaxis.simulate(scenario, save_audio=tmp_path / "ears")
+
+
+def test_a_finished_run_becomes_a_movie(run: phonotaxis.RunResult, tmp_path: Path):
+    """One second at 10 pictures per second, and the last state."""
+    from PIL import Image
+
+    with Image.open(run.movie(tmp_path / "run.gif")) as movie:
+        assert abs(getattr(movie, "n_frames") - 10) <= 1  # noqa: B009
+    with pytest.raises(phonotaxis.InputError, match="movie: "):
+        run.movie(tmp_path / "run.gif")
 
 
 def test_a_run_is_saved_whole_and_once(run: phonotaxis.RunResult, tmp_path: Path):

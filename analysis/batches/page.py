@@ -346,13 +346,10 @@ def _commands(batch: Batch, summary: Summary) -> list[Content]:
         failures = [(label, runs) for label, runs in failures if len(runs)]
         most = MOST_ERRORS if cause == FAILED else MOST_OTHERS
         for label, runs in sorted(failures, key=lambda each: len(each[1])):
-            caption = (
-                f"{cause}, {label}: {len(runs)} runs"
-                if label
-                else (f"{cause}: {len(runs)} runs")
-            )
-            if len(runs) > most:
-                caption += f", of which {most}"
+            shown = f"{most} of " if len(runs) > most else ""
+            noun = "run" if len(runs) == 1 else "runs"
+            where = f", {label}" if label else ""
+            caption = f"{cause}{where}: {shown}{len(runs)} {noun}"
             chosen = runs.sort_values(
                 "collision_fault", key=lambda fault: fault != "robot", kind="stable"
             )

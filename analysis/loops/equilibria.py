@@ -206,10 +206,11 @@ class EquilibriumSearch:
         traps = [point.p_WP for point in self.switching if point.attractive]
         if traps:
             places = [f"({u:.3f}, {v:.3f})" for u, v in traps[:3]]
+            points = "point" if len(traps) == 1 else "points"
             found.append(
-                f"P can also come to stay, chattering, at {len(traps)} attractive "
-                f"switching points: {', '.join(places)} m"
-                f"{' and others' if len(traps) > 3 else ''}. No linear model holds "
+                f"P can also chatter and stay at {len(traps)} attractive switching "
+                f"{points}: {', '.join(places)} m"
+                f"{' and others' if len(traps) > 3 else ''}. No linear model is valid "
                 "there."
             )
         return tuple(found)

@@ -60,6 +60,13 @@ class Mode:
         return 4.0 * self.time_constant_s if self.eigenvalue.real < 0.0 else math.inf
 
 
+def _shown(pole: complex) -> str:
+    """Writes a real pole, or a pair of complex poles."""
+    if pole.imag == 0.0:
+        return f"{pole.real:.4g}"
+    return f"{pole.real:.4g} +/- {pole.imag:.4g}j"
+
+
 @dataclass(frozen=True)
 class LinearModel:
     """Linear state-space model in continuous or sampled time, with named signals.
@@ -80,6 +87,28 @@ class LinearModel:
     output_names: tuple[str, ...]
     period_s: float | None = None
     """Sample period, s. In continuous time: None."""
+
+    def __str__(self) -> str:
+        """Size, signals and poles of the model."""
+        unit = "rad/s" if self.period_s is None else "z"
+        kind = (
+            "continuous" if self.period_s is None else f"sampled, {self.period_s:g} s"
+        )
+        inputs, outputs, poles = (
+            ", ".join(each) or "none"
+            for each in (
+                self.input_names,
+                self.output_names,
+                [_shown(pole) for pole in self.poles if pole.imag >= 0.0],
+            )
+        )
+        return "\n".join(
+            [
+                f"{self.name}: {len(self.A)} states, {kind}",
+                f"inputs: {inputs}; outputs: {outputs}",
+                f"poles ({unit}): {poles}",
+            ]
+        )
 
     def to_control(self) -> Any:
         """Returns the model as a ``control.StateSpace`` with named signals.

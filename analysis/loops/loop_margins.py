@@ -163,6 +163,26 @@ class LoopMargins:
     )
     """One disk margin for each of ``SKEWS``."""
 
+    def __str__(self) -> str:
+        """The margins, one per line, with their units."""
+        if not self.stable:
+            return f"{self.name}: the closed loop is unstable"
+        up, down = self.gain_increase_margin, self.gain_reduction_margin
+        rows = {
+            "gain": f"{_in_db(up)} up, {_in_db(down)} down",
+            "phase": f"{self.phase_lag_margin_deg:.4g} deg lag, "
+            f"{self.phase_lead_margin_deg:.4g} deg lead, "
+            f"at {self.crossover_rad_s:.4g} rad/s",
+            "delay": f"{self.delay_margin_s:.4g} s",
+            "modulus": f"{self.modulus_margin:.4g} "
+            f"at {self.modulus_frequency_rad_s:.4g} rad/s",
+            "peaks": f"M_s {self.sensitivity_peak:.4g}, "
+            f"M_t {self.complementary_peak:.4g}",
+            "disk": f"alpha {self.disk.alpha:.4g}: {self.disk.gain_margin_db:.4g} dB "
+            f"and {self.disk.phase_margin_deg:.4g} deg",
+        }
+        return "\n".join([f"{self.name}: the closed loop is stable", *_aligned(rows)])
+
     @cached_property
     def response(self) -> FrequencyResponse:
         """Frequency response with enough points for figures."""
@@ -194,6 +214,18 @@ class LoopMargins:
     def disk(self) -> DiskMargin:
         """Disk margin with skew 0."""
         return next(disk for disk in self.disks if disk.skew == 0.0)
+
+
+def _aligned(rows: dict[str, str]) -> list[str]:
+    width = max(map(len, rows))
+    return [f"{name:<{width}}  {value}" for name, value in rows.items()]
+
+
+def _in_db(factor: float) -> str:
+    """Writes a gain factor with its size in dB; the factor may be 0 or infinite."""
+    if factor in {0.0, math.inf}:
+        return "no limit"
+    return f"{factor:.4g} ({20.0 * math.log10(factor):+.4g} dB)"
 
 
 def _least_db(low: float, high: float) -> float:

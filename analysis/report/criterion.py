@@ -38,6 +38,9 @@ class Criterion(Generic[Data]):
     read: Callable[[Data], Reading]
     """Takes the number from the data of the section. If there is no such number, the
     result is NaN, or a clause with the reason."""
+    where: Callable[[Data], str] = lambda data: ""
+    """States which of several parts of the system has the number, for example which
+    cut loop has the least margin. Empty if there is only one part."""
 
     @property
     def threshold(self) -> str:
@@ -64,17 +67,26 @@ class Criterion(Generic[Data]):
         if math.isnan(value):
             return self.without_number("there is no such number")
         met = self.met_by(value)
-        return self._verdict(
-            float(value), "pass" if met else "fail", self.good if met else self.bad
-        )
+        verdict: Judgement = "pass" if met else "fail"
+        text = self.good if met else self.bad
+        return self._verdict(float(value), verdict, text, self.where(data))
 
     def without_number(self, reason: str) -> Verdict:
         """Returns the verdict ``not applicable``; ``reason`` is its text, a clause."""
         return self._verdict(None, "not applicable", reason)
 
-    def _verdict(self, value: float | None, verdict: Judgement, text: str) -> Verdict:
+    def _verdict(
+        self, value: float | None, verdict: Judgement, text: str, where: str = ""
+    ) -> Verdict:
         return Verdict(
-            self.name, value, self.unit, self.threshold, verdict, text, self.source
+            name=self.name,
+            value=value,
+            where=where,
+            unit=self.unit,
+            threshold=self.threshold,
+            verdict=verdict,
+            text=text,
+            source=self.source,
         )
 
 
@@ -85,6 +97,8 @@ class Verdict:
     name: str
     value: float | None
     """The number, or None if it does not exist."""
+    where: str
+    """Part of the system that has the number; empty if there is only one part."""
     unit: str
     threshold: str
     verdict: Judgement
@@ -104,7 +118,8 @@ class VerdictRow:
     values: dict[str, float | None]
     verdicts: dict[str, Judgement]
     text: str
-    """Texts of the verdicts. Laws with the same text share one sentence."""
+    """Texts of the verdicts. Laws with the same text share one sentence. With a single
+    law, the text also states where the number is from."""
 
 
 def shown_value(value: float | None, unit: str) -> float | str | None:
@@ -146,7 +161,8 @@ def _together(found: dict[str, Verdict]) -> str:
     for law, verdict in found.items():
         groups.setdefault(verdict.text, []).append(law)
     if len(found) == 1:
-        return f"{next(iter(groups))}."
+        only = next(iter(found.values()))
+        return f"{only.text} ({only.where})." if only.where else f"{only.text}."
     if len(groups) == 1:
         subject = "All" if len(found) > 2 else " and ".join(found)
         return f"{subject}: {next(iter(groups))}."

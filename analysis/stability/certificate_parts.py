@@ -80,7 +80,7 @@ CERTIFIED_STARTS = Part[CertifiedStarts](
     criteria=(
         Criterion(
             "start certified", YES_OR_NO, "at least", 1.0,
-            "in the certificate's model, P touches nothing from this scenario's start",
+            "in the certificate's model, P never touches a body from this start",
             "energy alone does not exclude a contact from this start",
             "energy certificate",
             _start_certified,
@@ -104,8 +104,8 @@ def _show_balance(data: EnergyBalance) -> list[Content]:
     return [
         (
             "The velocity term adds energy when it pushes along the motion. The loop "
-            "is passive where the attraction's damping takes at least as much energy "
-            "at every speed."
+            "is passive if the damping of the attraction removes at least as much "
+            "energy at every speed."
         ),
         fact_table(plain(data)),
         Figure(
@@ -131,8 +131,8 @@ ENERGY_BALANCE = Part[EnergyBalance](
     criteria=(
         Criterion(
             "largest power of the velocity term", "of D_r", "at most", 1.0,
-            "the velocity term never gives more energy than D_r takes",
-            "the velocity term can drive the motion",
+            "the velocity term never adds more energy than D_r removes",
+            "the velocity term can add more energy than D_r removes",
             "passivity",
             _injected_share,
         ),

@@ -313,8 +313,8 @@ def _show_step(data: StepCheck) -> list[Content]:
         Table(["", "rad/s", "damping ratio"], rows),
         Figure(
             lambda: plot_step(data),
-            "A small step: the linear model, released at rest, and simulation. A law "
-            "whose velocity term acts from afar pushes once at the beginning of a run.",
+            "Motion after a release at rest: linear model and simulation. If the "
+            "velocity term of the law acts there, it pushes once at the beginning.",
         ),
     ]
 
@@ -349,7 +349,7 @@ OPERATING_POINTS = Part[OperatingPoints](
             "places where the robot can jam", "", "at most", 0.0,
             "it rests near the follow distance only",
             "it can come to rest away from the source",
-            "no such place is wanted; away means outside the goal of a run",
+            "set by this project; a jam is a place of rest outside the goal of a run",
             lambda data: data.jams,
         ),
         Criterion(
@@ -393,8 +393,8 @@ STEP = Part[StepCheck](
         Criterion(
             "error of the linear prediction of a small step", "% off", "at most", 2.0,
             "frequency and damping agree with the nonlinear simulation",
-            "the corner of the velocity term at rest, which no linear model has, has "
-            "an effect",
+            "the corner of the velocity term at rest has an effect, which no linear "
+            "model describes",
             "2 % in frequency and damping, with exact sensors",
             lambda data: 100.0 * max(
                 abs(data.frequency_error), abs(data.damping_error)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -246,23 +247,13 @@ def margin_criteria(
     ``loops`` is a function from the data object of a part to the margins of these cut
     loops.
     """
-
-    def worst(
-        choose: Callable[[list[float]], float], name: str
-    ) -> Callable[[Data], Reading]:
-        def read(data: Data) -> Reading:
-            values = [getattr(margins, name) for margins in loops(data)]
-            return choose(values) if values else math.nan
-
-        return read
-
     return (
         Criterion(
             "least phase margin", "deg", "at least", REQUIRED.phase_margin_deg,
             "every cut loop tolerates the usual extra phase lag or lead",
             "a small extra phase makes the loop oscillate",
             _USUAL,
-            worst(min, "phase_margin_deg"),
+            *_worst(min, attrgetter("phase_margin_deg"), loops),
         ),
         Criterion(
             "least gain margin", "dB", "at least", REQUIRED.gain_margin_db,
@@ -270,16 +261,40 @@ def margin_criteria(
             "a gain that is off by less than a factor of two, up or down, makes it "
             "unstable",
             _USUAL,
-            worst(min, "gain_margin_db"),
+            *_worst(min, attrgetter("gain_margin_db"), loops),
         ),
         Criterion(
             "largest sensitivity peak", "", "at most", REQUIRED.sensitivity_peak,
             "disturbances are hardly amplified",
             "disturbances near the crossover are amplified more than twice",
             "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",
-            worst(max, "sensitivity_peak"),
+            *_worst(max, attrgetter("sensitivity_peak"), loops),
         ),
     )  # fmt: skip
+
+
+def _worst(
+    choose: Callable[..., LoopMargins | None],
+    value: Callable[[LoopMargins], float],
+    loops: Callable[[Data], Sequence[LoopMargins]],
+) -> tuple[Callable[[Data], Reading], Callable[[Data], str]]:
+    """Returns ``read`` and ``where`` of a criterion for the worst of several cut loops.
+
+    ``choose`` is ``min`` or ``max``, and ``value`` takes the margin of a loop.
+    """
+
+    def found(data: Data) -> LoopMargins | None:
+        return choose(loops(data), key=value, default=None)
+
+    def read(data: Data) -> Reading:
+        worst = found(data)
+        return value(worst) if worst else math.nan
+
+    def where(data: Data) -> str:
+        worst = found(data)
+        return worst.name.removeprefix("L ") if worst else ""
+
+    return read, where
 
 
 def _all_cuts(data: Margins) -> list[LoopMargins]:
@@ -295,10 +310,10 @@ MARGINS = Part[Margins](
         *margin_criteria(_all_cuts),
         Criterion(
             "least disk margin", "", "at least", REQUIRED.disk_margin,
-            "gain and phase may change at once, by 6 dB and 37 deg",
-            "a change of gain and phase at once makes the loop oscillate early",
+            "gain and phase may change at once; alone, by 6 dB or by 37 deg",
+            "a small change of gain and phase at once makes the loop oscillate",
             "alpha = 2/3: 6 dB in each direction (Seiler, Packard and Gahinet 2020)",
-            lambda data: min((m.disk.alpha for m in _all_cuts(data)), default=math.nan),
+            *_worst(min, attrgetter("disk.alpha"), _all_cuts),
         ),
     ),
     document=_document,

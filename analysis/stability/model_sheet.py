@@ -60,18 +60,17 @@ _CONVENTIONS = (
 _ASSUMPTIONS = (
     *_CONVENTIONS,
     (
-        "Linear models describe the diagram with exact sensors (`hearing` and "
-        "`obstacle_sensing` ideal, odometry not rounded); the builder of simulations "
-        "makes this diagram. Only simulations have noise, converter, estimator and "
-        "cones."
+        "Linear models describe the diagram that is simulated with exact sensors "
+        "(`hearing` and `obstacle_sensing` ideal, odometry not rounded). They include "
+        "no noise, no converter, no estimator and no cones."
     ),
     (
         "They are valid while |v_P| and the wheels stay below their limits, and while "
         "no echo appears or disappears."
     ),
     (
-        "The heading follows the motion of P and is neutral at rest: judgments of "
-        "stability leave out its poles at 0 (z = 1)."
+        "The heading follows the motion of P and is neutral at rest. Its poles at 0 "
+        "(z = 1) do not count for stability."
     ),
 )
 _ROUTE_ASSUMPTIONS = (
@@ -84,7 +83,7 @@ _ROUTE_ASSUMPTIONS = (
         "They are valid while |v_P|, the acceleration and the wheels stay below their "
         "limits."
     ),
-    "No linear model has the planner, the safety filter or the adaptation.",
+    "No linear model includes the planner, the safety filter or the adaptation.",
 )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -74,15 +74,8 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
 
 
 def stability_text(analyses: Sequence[LawAnalysis]) -> str:
-    """Returns the verdicts and the notes of a stability analysis as text."""
-    table = verdict_table(analyses)
-    # The last column, the verdict in plain words, is too wide for a terminal.
-    columns, rows = table.columns[:-1], [row[:-1] for row in table.rows]
-    lines = [text(Table(["", *columns[1:]], rows))] if rows else []
-    for each in analyses:
-        before = f"{each.law}: " if len(analyses) > 1 else ""
-        lines += [f"note: {before}{note}" for note in each.notes]
-    return "\n".join(lines)
+    """Returns the summary of a stability report as text for a terminal."""
+    return "\n\n".join(map(text, _summary(analyses, narrow=True).contents))
 
 
 def report_figures(analyses: Sequence[LawAnalysis]) -> dict[str, Figure]:
@@ -154,25 +147,48 @@ def verdict_table(analyses: Sequence[LawAnalysis]) -> Table:
     return Table(["criterion", "threshold", *laws, "in plain words"], rows)
 
 
-def _summary(analyses: Sequence[LawAnalysis]) -> Section:
-    sheet = analyses[0].sheet
+def _narrow(table: Table) -> Iterator[Content]:
+    """Yields a table of verdicts without the column "in plain words".
+
+    This column is too wide for a terminal. Its texts about criteria that fail follow
+    below the table.
+    """
+    columns, rows = ["", *table.columns[1:-1]], list(table.rows)
+    if rows:
+        yield Table(columns, [row[:-1] for row in rows])
+    failed = [
+        f"{row[0]}: {row[-1]}"
+        for row in rows
+        if any(isinstance(cell, Judged) and cell.verdict == "fail" for cell in row)
+    ]
+    if failed:
+        yield "Why criteria fail:"
+        yield Bullets(failed)
+
+
+def _summary(analyses: Sequence[LawAnalysis], *, narrow: bool = False) -> Section:
+    """Returns the summary of the report; ``narrow`` is the form for a terminal."""
+    sheet, table = analyses[0].sheet, verdict_table(analyses)
     notes = [
         note if len(analyses) == 1 else f"{law_title(analysis.law)}: {note}"
         for analysis in analyses
         for note in analysis.notes
     ]
     before: list[Content] = ["Before you use the numbers:", Bullets(notes)]
+    origin = [
+        ("Seed", str(sheet.seed)),
+        ("Versions", ", ".join(f"{k} {v}" for k, v in sheet.versions.items())),
+    ]
     contents: list[Content] = [
         Definitions(
             [
                 ("Scenario", f"{sheet.scenario}: {sheet.description}"),
-                ("Seed", str(sheet.seed)),
-                ("Versions", ", ".join(f"{k} {v}" for k, v in sheet.versions.items())),
+                *([] if narrow else origin),
             ]
         ),
         Bullets([_count(analysis) for analysis in analyses]),
         *(before if notes else []),
-        verdict_table(analyses),
+        *(_narrow(table) if narrow else [table]),
         *(
             f"{law_title(a.law)}: {a.found['recommended_gains'].advice}"
             for a in analyses
@@ -218,6 +234,7 @@ def _verdicts(verdicts: Sequence[Verdict]) -> Section:
         {
             "criterion": "name",
             "value": lambda verdict: shown_value(verdict.value, verdict.unit),
+            "where": "where",
             "threshold": "threshold",
             "verdict": "verdict",
             "in plain words": "text",

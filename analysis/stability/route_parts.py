@@ -314,15 +314,15 @@ def _show_adaptation(data: Adaptation) -> list[Content]:
             f"{', '.join(number(_plain(pole)) for pole in found.reference_poles)} "
             "rad/s, and over a tick the poles "
             f"{', '.join(number(_plain(z)) for z in found.held_poles)}. The sampled "
-            "reference is exact. It has the nominal gains, so that there is nothing to "
-            "learn on free floor: contacts, limits and motors cause all that the law "
-            "learns."
+            "reference is exact. It has the nominal gains. On free floor, there is "
+            "therefore nothing to learn: the law learns only because of contacts, "
+            "limits and motors."
         ),
         _of_lyapunov(found),
-        f"The adaptation rate is gamma = {number(found.rate)}. Without limits K and D "
-        f"run away at rates from {number(found.critical.rate)} on, "
+        f"The adaptation rate is gamma = {number(found.rate)}. Without limits, K and "
+        f"D run away at rates of {number(found.critical.rate)} or more, which is "
         f"{number(found.margin)} times the current rate, if the target swings by "
-        f"{number(found.critical.amplitude_m)} m; this is the lag at which the target "
+        f"{number(found.critical.amplitude_m)} m. With a lag of this size, the target "
         "pulls P through a contact. gamma_crit a\u00b2 is "
         + ", ".join(
             f"{number(each.product)} at {number(each.amplitude_m)} m"
@@ -414,8 +414,8 @@ ADAPTATION = Part[Adaptation](
         ),
         Criterion(
             "critical adaptation rate over the current rate", "", "above", 1.0,
-            "K and D do not run away where the target leads by the largest lag",
-            "K and D run away where the target leads by the largest lag",
+            "K and D do not run away, even if the target leads by the largest lag",
+            "K and D run away if the target leads by the largest lag",
             "simulated without contacts and without limits",
             lambda data: data.stability.margin,
         ),

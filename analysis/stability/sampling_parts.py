@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -51,9 +52,14 @@ class SampledLoop:
     motion along the line to the source. None if this margin is infinite or missing."""
 
     @property
+    def least(self) -> DelayMargin | None:
+        """The smallest delay margin; None if there are none."""
+        return min(self.margins, key=attrgetter("delay_s"), default=None)
+
+    @property
     def least_s(self) -> float:
-        """Least of the delay margins, s. NaN if there are none."""
-        return min((margin.delay_s for margin in self.margins), default=math.nan)
+        """The smallest delay margin, s. NaN if there are none."""
+        return self.least.delay_s if self.least else math.nan
 
 
 @dataclass(frozen=True)
@@ -105,11 +111,11 @@ def _sampled_document(data: SampledLoop) -> dict[str, Any]:
 def _show_sampled(data: SampledLoop) -> list[Content]:
     contents: list[Content] = [
         (
-            "A delay margin is the delay that may be added before the loop oscillates, "
-            "in fractions of a tick. It comes from bisection on the spectral radius of "
-            "the one-period map with that delay. A delay at the sensor makes an "
-            "estimate later than the tracker assumes; a delay at the wheels makes a "
-            "command later."
+            "A delay margin is the smallest additional delay with which the loop is no "
+            "longer stable. It need not be a whole number of ticks. It comes from "
+            "bisection on the spectral radius of the one-period map with that delay. A "
+            "delay at the sensor makes an estimate later than the tracker assumes; a "
+            "delay at the wheels makes a command later."
         ),
         Table.of(
             data.margins,
@@ -157,6 +163,9 @@ DELAY_MARGINS = Part[SampledLoop](
             "less added delay than the threshold makes it oscillate",
             "set by this project; exact margin of the sampled loop",
             lambda data: data.least_s,
+            lambda data: (
+                f"at the {data.least.at}, {data.least.direction}" if data.least else ""
+            ),
         ),
     ),
     document=_sampled_document,
@@ -228,6 +237,7 @@ BURST_CYCLE = Part[BurstCycles](
             "it swings ever farther because the source is silent most of the time",
             "stability over a cycle of the sound",
             lambda data: next(c.largest for c in data.cycles if c.hold == data.today),
+            lambda data: f"hold `{data.today}`",
         ),
     ),
     document=_burst_document,
@@ -281,11 +291,11 @@ def _show_contact(data: ContactMode) -> list[Content]:
     ]
     return [
         (
-            "Before an obstacle the law's spring adds to K_r, while the damping is "
-            "still D_r. The table lists the largest springs with which the robot comes "
-            "to rest, over the motors' lag and the age of an echo (in ticks of "
-            f"{limits.tick_s * 1e3:g} ms). This scenario has {lag:g} s and {ticks} "
-            "ticks."
+            "In front of an obstacle, the stiffness of the law adds to K_r, and the "
+            "damping is D_r. The table lists the largest stiffness of a law with which "
+            "the robot comes to rest, for several motor lags and ages of the echoes "
+            f"(in ticks of {limits.tick_s * 1e3:g} ms). In this scenario, the motor "
+            f"lag is {lag:g} s, and echoes are {ticks} ticks old."
         ),
         Table(
             [Column("motor lag", "s"), *(f"{t} ticks" for t in limits.latency_ticks)],
@@ -306,8 +316,8 @@ CONTACT_MODE = Part[ContactMode](
     criteria=(
         Criterion(
             "growth where the law is stiffest", "1/s", "below", 0.0,
-            "it comes to rest however hard it presses against an obstacle",
-            "it swings where it presses to the law's stiffest point",
+            "it comes to rest in front of an obstacle, even where the law is stiffest",
+            "it swings in front of an obstacle, where the law is stiffest",
             "stability of the contact mode at the law's largest slope",
             lambda data: _of_push(data.growth_per_s),
         ),

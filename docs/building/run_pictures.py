@@ -1,10 +1,9 @@
-"""Pictures of runs in the pages, but for those of the gallery.
+"""Pictures of runs and comparisons in the pages, except for those of the gallery.
 
-``python -m docs.building.run_pictures [NAME ...]`` draws them anew, in some three
-minutes. Which layouts of the guarded law are worst, typical and best, ``phonotaxis
-compare two_moving_obstacles --laws guarded --runs 150 --seed 2026 --set
-hearing=ideal`` prints at its end, in some two minutes: when the law has changed, write
-their numbers into ``LAYOUTS``.
+``python -m docs.building.run_pictures [NAME ...]`` draws them anew, in about three
+minutes. If the guarded law has changed, run ``phonotaxis compare two_moving_obstacles
+--laws guarded --runs 150 --seed 2026 --set hearing=ideal``. It prints which layouts are
+the worst, a typical one and the best. Write their numbers into ``LAYOUTS``.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from analysis.batches.comparison_plans import comparison_plan
 from analysis.views.block_diagram import block_svg
 from analysis.views.picture import plot_trajectory
 from diagrams import Scenario, build_sound_follower, load_scenario, simulate
+from docs.building.law_rates import plot_law_rates
 from docs.building.page_code import page_file
 from phonotaxis import main
 
@@ -27,6 +27,8 @@ _DOCS = Path(__file__).resolve().parents[1]
 IMAGES = _DOCS / "images"
 #: The moving picture of README.
 FILM = "default_run"
+#: The picture of the rates of the papers' laws, which ``docs/results`` has.
+RATES = "laws"
 #: Numbers of layouts of ``two_moving_obstacles``, as the comparison prints them.
 LAYOUTS = {"worst": 39, "typical": 33, "best": 54}
 _SEED = 2026
@@ -77,10 +79,12 @@ DIAGRAMS: Mapping[str, Scenario] = {
 
 
 def draw(name: str) -> None:
-    """Draws one picture: of a run, of a diagram, or the film of README."""
+    """Draws one picture: of a run, of a diagram, of rates, or README's film."""
     if name in DIAGRAMS:
         diagram = build_sound_follower(DIAGRAMS[name]).diagram
         (IMAGES / f"{name}.svg").write_text(block_svg(diagram), "utf-8")
+    elif name == RATES:
+        plot_law_rates().savefig(IMAGES / f"{name}.png", dpi=150)
     elif name == FILM:
         (IMAGES / f"{name}.gif").unlink(missing_ok=True)
         with TemporaryDirectory() as folder:
@@ -92,5 +96,5 @@ def draw(name: str) -> None:
 
 
 if __name__ == "__main__":
-    for picture in sys.argv[1:] or [*PICTURES, *DIAGRAMS, FILM]:
+    for picture in sys.argv[1:] or [*PICTURES, *DIAGRAMS, RATES, FILM]:
         draw(picture)

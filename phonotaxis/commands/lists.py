@@ -128,13 +128,48 @@ def _results(options: Namespace, take: Take) -> Prepared[Printed]:
     from analysis.report.provenance import SCHEMA_VERSION
     from analysis.report.result_directory import RESULTS, numbered_results
 
-    rows = [(str(path), _changed(path), _title(path)) for path in numbered_results()]
+    given = options.directories
+    paths = [each for path in given for each in _results_in(path)]
+    paths = paths if given else numbered_results()
+    rows = [(str(path), _changed(path), _title(path)) for path in paths]
     listed = [{"out": out, "time": at, "title": title} for out, at, title in rows]
     text = "\n".join("  ".join(row) for row in rows)
     return _printed(
         {"schema_version": SCHEMA_VERSION, "results": listed},
         text or f"no results under {RESULTS}/; 'phonotaxis simulate' writes some",
     )
+
+
+def _add_results_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "directories",
+        metavar="DIR",
+        nargs="*",
+        help="list these result directories, or those in these folders (default: "
+        "results)",
+    )
+    take_json(parser)
+
+
+def _results_in(given: str) -> list[Path]:
+    """Returns a result directory itself, or the result directories in a folder."""
+    from systems.framework.input_error import InputError
+
+    path = Path(given).expanduser()
+    if _is_result(path):
+        return [path]
+    found = sorted(each for each in path.glob("*/") if _is_result(each))
+    if not found:
+        raise InputError(
+            "dir",
+            f"{given!r} has no results; give a directory that --out of another command "
+            "has named",
+        )
+    return found
+
+
+def _is_result(path: Path) -> bool:
+    return any((path / name).is_file() for name in ("summary.json", "report.html"))
 
 
 def _changed(path: Path) -> str:
@@ -338,10 +373,10 @@ LAWS = Command(
 )
 RESULTS = Command(
     "results",
-    "list the result directories under results/",
-    take_json,
+    "list result directories: those under results/, or those given",
+    _add_results_arguments,
     _results,
-    examples=("results",),
+    examples=("results", "results my_runs/wall my_runs"),
 )
 FIELDS = Command(
     "fields",

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import pytest
 
 from diagrams import simulate
-from docs.building.run_pictures import PICTURES
+from docs.building.law_rates import SUMMARY, plot_law_rates
+from docs.building.run_pictures import PICTURES, RATES
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -17,7 +19,20 @@ def test_each_picture_is_in_a_page() -> None:
     pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
     text = "".join(page.read_text("utf-8") for page in pages)
     shown = set(re.findall(r"images/(\w+)\.png", text))
-    assert set(PICTURES) <= shown
+    assert {*PICTURES, RATES} <= shown
+
+
+def test_rates_of_laws_are_those_of_the_summary() -> None:
+    """Points of the panels, against the counts of runs that ended by collision."""
+    cells = json.loads(SUMMARY.read_text("utf-8"))["cells"]
+    counted = [
+        sum(n for cause, n in cell["causes"].items() if cause.startswith("collision"))
+        for cell in cells
+    ]
+    panels = [
+        axes.containers[0].lines[0].get_xdata() for axes in plot_law_rates().axes[1::4]
+    ]
+    assert [x * 100 for panel in panels for x in panel] == pytest.approx(counted)
 
 
 @pytest.mark.slow

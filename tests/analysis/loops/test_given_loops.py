@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import control
 import numpy as np
@@ -29,6 +30,13 @@ def test_a_textbook_loop():
     assert found.phase_margin_deg == pytest.approx(29.1, abs=0.05)
     assert disk.alpha == pytest.approx(0.46, abs=0.005)
     assert disk.frequency_rad_s == pytest.approx(1.94, abs=0.02)
+    # 3.6 is 20 log10(3.6) = 11.1 dB.
+    assert re.search(
+        r"^gain +3\.6\d* \(\+11\.1\d* dB\) up, no limit down$", str(found), re.MULTILINE
+    )
+    assert re.search(r"^phase +29\.1\d* deg lag, ", str(found), re.MULTILINE)
+    unstable = phonotaxis.margins(control.tf([100.0], [1.0, 10.0, 10.0, 10.0]))
+    assert str(unstable).endswith("the closed loop is unstable")
 
 
 def test_sampled_models_keep_their_period():

@@ -63,6 +63,17 @@ def test_delays_have_no_pole_in_the_s_plane():
     assert model.damping_ratio == 1.0
 
 
+def test_a_model_is_printed_with_its_poles():
+    # s^2 + s + 1 has the roots -1/2 +/- j sqrt(3)/2.
+    A, B, C = np.array([[0.0, 1.0], [-1.0, -1.0]]), np.ones((2, 1)), np.ones((1, 2))
+    model = LinearModel("loop", A, B, C, np.zeros((1, 1)), ("x", "v"), ("u",), ("y",))
+    assert str(model).splitlines() == [
+        "loop: 2 states, continuous",
+        "inputs: u; outputs: y",
+        "poles (rad/s): -0.5 +/- 0.866j",
+    ]
+
+
 def test_participation_tells_states_apart():
     """Two masses that do not know of each other."""
     A = np.array([[-1.0, 0.0], [0.0, -5.0]])

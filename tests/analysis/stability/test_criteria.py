@@ -42,12 +42,22 @@ T = 0.025
 #: Stands in for any class.
 Made: Any = SimpleNamespace
 #: (phase deg, gain dB, M_s, alpha) of three cuts: no extreme is first or last.
-CUTS = ((50.0, 9.0, 1.5, 0.9), (20.0, 30.0, 4.0, 0.3), (80.0, 2.0, 1.1, 1.4),
-        (60.0, 12.0, 2.5, 0.7))  # fmt: skip
+CUTS = (("a", 50.0, 9.0, 1.5, 0.9), ("b", 20.0, 30.0, 4.0, 0.3),
+        ("c", 80.0, 2.0, 1.1, 1.4), ("d", 60.0, 12.0, 2.5, 0.7))  # fmt: skip
+#: Names of the cuts that have the extremes.
+WORST = {
+    "least phase margin": "at the b",
+    "least gain margin": "at the c",
+    "largest sensitivity peak": "at the b",
+    "least disk margin": "at the b",
+    "least delay margin": "at the place 1, along",
+    "deviation remaining after a burst cycle": "hold `motion`",
+}
 
 
-def cut(phase_deg, gain_db, peak, alpha):
+def cut(name, phase_deg, gain_db, peak, alpha):
     margins = Made(
+        name=f"L at the {name}",
         phase_margin_deg=phase_deg,
         gain_margin_db=gain_db,
         sensitivity_peak=peak,
@@ -73,9 +83,11 @@ def points(**changed):
 
 
 def sampled(*delays_s):
-    return SampledLoop(
-        T, np.array([]), tuple(Made(delay_s=each) for each in delays_s), None
+    margins = (
+        Made(delay_s=each, at=f"place {k}", direction="along")
+        for k, each in enumerate(delays_s)
     )
+    return SampledLoop(T, np.array([]), tuple(margins), None)
 
 
 def uncertain(growth_per_s):
@@ -156,6 +168,7 @@ def test_every_criterion_reads_what_its_name_says(part, data, expected):
     for name, (value, verdict) in expected.items():
         assert found[name].value == pytest.approx(value, rel=1e-9), name
         assert found[name].verdict == verdict, name
+        assert found[name].where == WORST.get(name, ""), name
 
 
 def test_no_criterion_is_left_out_above_and_no_name_occurs_twice():

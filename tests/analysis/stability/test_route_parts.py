@@ -99,14 +99,16 @@ def test_page_shows_a_law_and_the_table_both(analyses):
         "Not computed: law: 'trajectory_filtered' has no adaptation",
     ):
         assert text in page
-    lines = stability_text(analyses).splitlines()
-    assert lines[0].split() == [
+    blocks = stability_text(analyses).split("\n\n")
+    rows = next(block for block in blocks if "threshold" in block).splitlines()
+    assert rows[0].split() == [
         "threshold",
         "trajectory_adaptive",
         "trajectory_filtered",
     ]
-    rows = [line for line in lines if not line.startswith("note: ")]
     assert len({len(row) for row in rows}) == 1
+    failures = blocks[blocks.index("Why criteria fail:") + 1]
+    assert "- chain amplification in contact: " in failures
 
 
 def test_laws_of_a_route_are_chosen_on_a_route():
