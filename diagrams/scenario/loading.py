@@ -128,11 +128,14 @@ def written_fields(source: str | Path) -> dict[str, Any]:
         InputError: The name is unknown, or the file is unreadable.
     """
     from diagrams.scenario.former_fields import renewed
+    from diagrams.scenario.worlds.catalog import absolute
 
     path = _find(source)
     data = renewed(read_mapping(path))
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
+    if isinstance(data.get("world"), str):
+        data["world"] = absolute(data["world"], path.parent)
     return data
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from itertools import combinations
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
@@ -57,6 +58,7 @@ from diagrams.scenario.shorthand import (
     file_form,
     resolved,
 )
+from diagrams.scenario.worlds.catalog import filled
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
@@ -103,7 +105,9 @@ class Scenario(RunParameters):
     @model_validator(mode="before")
     @classmethod
     def _resolve(cls, data: Any) -> Any:
-        return resolved(data) if isinstance(data, Mapping) else data
+        if not isinstance(data, Mapping):
+            return data
+        return resolved(filled(data, FilePath.cwd()))
 
     if not TYPE_CHECKING:  # a type checker would accept every name
 
