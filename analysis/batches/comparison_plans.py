@@ -81,9 +81,8 @@ def comparison_plan(
     if laws is None:
         ours = WORLD_LAWS if worlds else FORCE_LAWS
         laws = ROUTE_LAWS if is_routed(base) else ours
-    layouts = (
-        (50 if runs is None else runs) if not worlds else len(worlds) * (runs or 1)
-    )
+    if runs is None:
+        runs = 1 if worlds else 50
     for key, values in (grid or {}).items():
         if isinstance(values, str):  # it would become a list of its letters
             raise InputError(f"grid.{key}", f"is {values!r}; give a list of values")
@@ -93,7 +92,7 @@ def comparison_plan(
             "law": tuple(chosen_names(laws, base)),
             **{k: tuple(v) for k, v in (grid or {}).items()},
         },
-        "runs": layouts,
+        "runs": runs * max(len(worlds), 1),
         "seed": seed,
         "pair": True,
     }

@@ -358,8 +358,8 @@ class SweepPlan(Parameters):
     def _draws(self, entropy: list[int]) -> Iterator[tuple[str, Any]]:
         """Draws the values of all fields in ``draw``; yields paths and values.
 
-        The numbers in ``entropy`` are the seed. The second one is the run. The draws of one key do not depend on
-        the other keys.
+        The numbers in ``entropy`` are the seed. The second one is the run. The draws of
+        one key do not depend on the other keys.
         """
         for key, distribution in self.draw.items():
             words = [*entropy, crc32(key.encode())]

@@ -134,7 +134,7 @@ def written_fields(source: str | Path) -> dict[str, Any]:
     data = renewed(read_mapping(path))
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
-    if isinstance(data.get("world"), str):
+    if data.get("world"):
         data["world"] = absolute(data["world"], path.parent)
     return data
 

@@ -10,6 +10,7 @@ from typing import Any
 from diagrams.scenario.shorthand import joined
 from diagrams.scenario.suggestions import did_you_mean
 from diagrams.scenario.worlds.cylinder_tables import CYLINDERS, PATHS, read_tables
+from diagrams.scenario.worlds.gazebo_worlds import gazebo_worlds, path_file
 from diagrams.scenario.worlds.world import World
 from systems.framework.input_error import InputError
 
@@ -22,7 +23,8 @@ def open_worlds(source: str | Path) -> dict[str, Callable[[], World]]:
     """Lists the worlds of a set, without reading all of them.
 
     Args:
-        source: ``shipped``, or a folder with ``cylinders.csv`` and ``paths.csv``.
+        source: ``shipped``, or a folder with ``cylinders.csv`` and ``paths.csv``, or
+            with ``world_N.world``.
 
     Returns:
         A function that reads each world, by name of the world, in order.
@@ -35,19 +37,25 @@ def open_worlds(source: str | Path) -> dict[str, Callable[[], World]]:
         stamps = tuple(_stamp(folder / name) for name in (CYLINDERS, PATHS))
         worlds = _tables(folder, stamps)
         return {name: lambda world=world: world for name, world in worlds.items()}
+    if folder.is_dir() and (found := gazebo_worlds(folder)):
+        return found
     what = "has no" if folder.is_dir() else "is no folder with"
     raise InputError(
         "worlds",
-        f"{source} {what} {CYLINDERS} and {PATHS}; give the folder that has them, or "
-        f"{SHIPPED!r}",
+        f"{source} {what} {CYLINDERS} or world_0.world; give the folder that has them, "
+        f"or {SHIPPED!r}",
     )
 
 
 def world_files(text: Any, folder: Path) -> list[Path]:
     """Returns the files that contain a world, which ``find_world`` reads."""
-    source, _ = _parts(text, folder)
+    source, name = _parts(text, folder)
     root = _SHIPPED_FOLDER if source == SHIPPED else Path(source)
-    return [root / CYLINDERS, root / PATHS]
+    if (root / CYLINDERS).exists():
+        return [root / CYLINDERS, root / PATHS]
+    files = [root / f"world_{name}.{ending}" for ending in ("world", "sdf")]
+    paths = [path_file(file) for file in files]
+    return [*files, *(path for path in paths if path)]
 
 
 def find_world(text: Any, folder: Path) -> World:
@@ -74,7 +82,7 @@ def find_world(text: Any, folder: Path) -> World:
     return worlds[name]()
 
 
-def absolute(text: str, folder: Path) -> str:
+def absolute(text: Any, folder: Path) -> str:
     """Returns the text of a world with the full path of its set."""
     source, name = _parts(text, folder)
     return f"{source}:{name}"

@@ -108,32 +108,26 @@ def _rows(
                     f"{','.join(required)}",
                 )
             for row in reader:
-                yield (
-                    reader.line_num,
-                    row["world"],
-                    _numbers(path, reader, row, columns),
-                )
+                where = f"line {reader.line_num}"
+                name = (row["world"] or "").strip()
+                if not name:
+                    raise InputError(str(path), f"{where} has no world; give its name")
+                yield reader.line_num, name, _numbers(path, where, row, columns)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(str(path), f"cannot be read ({reason})") from None
 
 
 def _numbers(
-    path: Path,
-    reader: csv.DictReader[str],
-    row: dict[str, str],
-    columns: dict[str, float | None],
+    path: Path, where: str, row: dict[str, str], columns: dict[str, float | None]
 ) -> dict[str, float]:
     values: dict[str, float] = {}
     for column, default in columns.items():
-        text = row[column] if column in row else default
+        text = row.get(column, default)
         try:
             values[column] = float(text)  # type: ignore[arg-type]
         except (TypeError, ValueError):
             values[column] = math.nan
         if not math.isfinite(values[column]):
-            raise InputError(
-                str(path),
-                f"line {reader.line_num}: {column} is {text!r}; give a number",
-            )
+            raise InputError(str(path), f"{where}: {column} is {text!r}; give a number")
     return values
