@@ -151,8 +151,10 @@ def _shades(path: Path, field: str) -> NDArray[np.float32]:
                 alpha = image.mode in {"LA", "RGBA", "PA"} or "transparency" in (
                     image.info
                 )
-                image = _on_white(image) if alpha else image.convert("RGB")
-            pixels = np.asarray(image, dtype=np.uint8)
+                colors = _on_white(image) if alpha else image.convert("RGB")
+                pixels = np.asarray(colors, dtype=np.uint8)
+            else:
+                pixels = np.asarray(image, dtype=np.uint8)
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
         if isinstance(error, InputError):
             raise
