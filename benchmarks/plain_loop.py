@@ -67,7 +67,8 @@ class PlainLoop:
         c = scenario.sound_speed_m_s
         self.path = scenario.source.path()
         self.obstacles = [o.path() for o in scenario.obstacles]
-        self.sizes = np.array([e for o in scenario.obstacles for e in o.size_m])
+        rows = [row for o in scenario.obstacles for row in o.shape().rectangles]
+        self.sizes = np.array([extent for row in rows for extent in row[3:]])
         seed = block_seed(scenario.seed, "sound_emitter")
         self.waveform = make_waveform(scenario.source.sound, seed)
         self.ticks = history_ticks(MAXIMUM_RANGE_M, c)

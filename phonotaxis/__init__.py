@@ -12,18 +12,26 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from phonotaxis.name_clashes import explain_hidden_modules, refuse_clashes
+
 if TYPE_CHECKING:
     from analysis.arrays.array_geometry import ArrayGeometry
     from analysis.arrays.source_estimate import SourceEstimate
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.batches.plan import SweepPlan
+    from analysis.loops.diagram_linearization import linearize
+    from analysis.loops.given_loops import disk_margin, loop_at, margins
+    from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
+    from analysis.views.live_view import add_live_view
     from diagrams.scenario.loading import library_scenarios, load_scenario
     from diagrams.scenario.scenario import Scenario
+    from phonotaxis import testing as testing
     from phonotaxis.arrays import ResolutionResult, array_resolution
     from phonotaxis.batches import ComparisonResult, SweepResult, compare, sweep
     from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
+    from phonotaxis.law_runs import LawsResult, simulate_laws
     from phonotaxis.listening import ListenResult, listen
     from phonotaxis.listings import Listing, laws, scenarios
     from phonotaxis.loops import DesignResult, StabilityResult, design, stability
@@ -44,6 +52,8 @@ __all__ = [
     "DelayResult",
     "DesignResult",
     "InputError",
+    "LawsResult",
+    "LinearizedDiagram",
     "ListenResult",
     "Listing",
     "LocateResult",
@@ -58,21 +68,27 @@ __all__ = [
     "SweepPlan",
     "SweepResult",
     "__version__",
+    "add_live_view",
     "array_resolution",
     "calibrate",
     "calibrate_delays",
     "columns",
     "compare",
     "design",
+    "disk_margin",
     "laws",
     "library_scenarios",
+    "linearize",
     "listen",
     "load_scenario",
     "locate",
     "locate_delays",
+    "loop_at",
     "main",
+    "margins",
     "scenarios",
     "simulate",
+    "simulate_laws",
     "stability",
     "sweep",
 ]
@@ -88,6 +104,8 @@ _HOMES = {
     "DelayResult": "phonotaxis.delays",
     "DesignResult": "phonotaxis.loops",
     "InputError": "systems.framework.input_error",
+    "LinearizedDiagram": "analysis.loops.linearized_diagram",
+    "LawsResult": "phonotaxis.law_runs",
     "ListenResult": "phonotaxis.listening",
     "Listing": "phonotaxis.listings",
     "LocateResult": "phonotaxis.recordings",
@@ -101,23 +119,32 @@ _HOMES = {
     "StabilityResult": "phonotaxis.loops",
     "SweepPlan": "analysis.batches.plan",
     "SweepResult": "phonotaxis.batches",
+    "add_live_view": "analysis.views.live_view",
     "array_resolution": "phonotaxis.arrays",
     "calibrate": "phonotaxis.recordings",
     "calibrate_delays": "phonotaxis.delays",
     "columns": "analysis.runs.columns",
     "compare": "phonotaxis.batches",
     "design": "phonotaxis.loops",
+    "disk_margin": "analysis.loops.given_loops",
     "laws": "phonotaxis.listings",
+    "loop_at": "analysis.loops.given_loops",
+    "margins": "analysis.loops.given_loops",
     "library_scenarios": "diagrams.scenario.loading",
+    "linearize": "analysis.loops.diagram_linearization",
     "listen": "phonotaxis.listening",
     "load_scenario": "diagrams.scenario.loading",
     "locate": "phonotaxis.recordings",
     "scenarios": "phonotaxis.listings",
     "locate_delays": "phonotaxis.delays",
     "simulate": "phonotaxis.runs",
+    "simulate_laws": "phonotaxis.law_runs",
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",
 }
+
+refuse_clashes()
+explain_hidden_modules()
 
 
 def __getattr__(name: str) -> Any:
@@ -127,10 +154,15 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         value = version("phonotaxis")
+    elif name == "testing":
+        value = import_module("phonotaxis.testing")
     elif name in _HOMES:
         value = getattr(import_module(_HOMES[name]), name)
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from phonotaxis.other_names import of_module
+
+        hint = of_module(name, __all__)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
     globals()[name] = value
     return value
 

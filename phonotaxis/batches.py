@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, overload
@@ -16,12 +16,13 @@ from analysis.batches.batch import (
     prepare_comparison,
 )
 from analysis.batches.comparison_plans import EXPERIMENTS, comparison_plan
-from analysis.batches.figures import write_figures
+from analysis.batches.figures import batch_figures
 from analysis.batches.page import write_batch
 from analysis.batches.plan import SweepPlan, load_sweep
 from analysis.batches.plots import plot_cells, plot_over
 from analysis.batches.report import batch_document, batch_text, warning_lines
 from analysis.report.result_directory import whole_directory
+from diagrams.scenario.suggestions import Laws
 from phonotaxis.result import Prepared, Result, ignore
 from systems.framework.input_error import InputError
 
@@ -98,20 +99,14 @@ class BatchResult(Result):
             raise InputError("scenario", f"{scenario!r} is not there; use {known}")
         return plot_over(chosen.plan, chosen.rows, quantity, over, by)
 
-    def save_figures(self, directory: str | Path) -> list[Path]:
-        """Writes figures as PDF, SVG and PNG files, for papers.
+    def figures(self) -> dict[str, Figure]:
+        """Draws the figures of a paper, by name.
 
         There is one figure of all cells per scenario. For each number in the grid, and
         for each drawn number, there are figures of the success rate and the collision
         rate.
-
-        Args:
-            directory: Directory, which is created if it does not exist.
-
-        Returns:
-            Paths of the files.
         """
-        return write_figures(self.batch, Path(directory))
+        return batch_figures(self.batch)
 
     def write(self, document: dict[str, Any], directory: Path) -> None:
         """Writes the page, the JSON document and the examples into ``out``.
@@ -239,7 +234,7 @@ def prepare_sweep(
 
 def compare(
     *scenarios: str | Path,
-    laws: str | Iterable[str] | None = None,
+    laws: Laws | None = None,
     runs: int = 50,
     seed: int = 1,
     settings: Mapping[str, Any] | None = None,
@@ -257,8 +252,9 @@ def compare(
         *scenarios: Names of scenarios in the library, YAML files of layouts, or YAML
             files of scenarios. If none are given, the four experiments of the papers
             are run.
-        laws: Names of the laws, as a list or as one text with commas. ``all`` means
-            every law for robots of this kind. None means the laws of the papers and
+        laws: Names of the laws, as a list or as one text with commas. Functions and
+            classes at the top level of a module may replace names. ``all`` means every
+            law for robots of this kind. None means the laws of the papers and
             driving without avoidance. For a scenario with routes, None means the laws
             for routes.
         runs: Number of layouts per scenario. Every law meets each layout.

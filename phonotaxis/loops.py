@@ -25,7 +25,7 @@ from diagrams.building.laws import make_controller
 from diagrams.scenario.loading import changed_scenario
 from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.scenario_files import check_files
-from diagrams.scenario.suggestions import law_names
+from diagrams.scenario.suggestions import Laws, law_names
 from phonotaxis.result import Prepared, Result, ignore
 from systems.framework.input_error import InputError
 
@@ -156,7 +156,7 @@ class DesignResult(Result):
 def stability(
     scenario: Scenario | str | Path = "default",
     *,
-    laws: str | Iterable[str] = (),
+    laws: Laws = (),
     robot: str | None = None,
     full: bool = False,
     settings: Iterable[str] | Mapping[str, Any] = (),
@@ -173,8 +173,9 @@ def stability(
         scenario: Scenario from ``load_scenario``, name of a scenario in the library, or
             path of a YAML file.
         laws: Names of the control laws to compare, as a list or as one text with
-            commas. ``all`` means all laws that avoid obstacles, or all laws for routes.
-            An empty list means the law of the scenario.
+            commas. Functions and classes may replace names. ``all`` means all laws that
+            avoid obstacles, or all laws for routes. An empty list means the law of the
+            scenario.
         robot: Name of the robot to analyze. None means the first robot.
         full: Whether to check the analysis by more and longer simulations.
         settings: Fields of the scenario to change, as for ``load_scenario``.
@@ -190,10 +191,10 @@ def stability(
         InputError: The law or the robot does not exist, or the robot has no linear
             model.
     """
-    laws = [*law_names(laws), *law_names(fields.pop("law", ()))]
+    names = [*law_names(laws), *law_names(fields.pop("law", ()))]
     scenario = changed_scenario(scenario, settings, fields)
     alone, note = chosen_robot(scenario, robot)
-    prepared = prepare_stability(chosen_laws(alone, laws), note, full=full)
+    prepared = prepare_stability(chosen_laws(alone, names), note, full=full)
     return prepared.run(progress or ignore)
 
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,6 +40,23 @@ class Output(ABC):
 
 class Result(Output):
     """Result of a public function, and of the command with the same name."""
+
+    where: ClassVar[str] = ""
+    """Last lines that the command prints, with ``{out}`` for the directory. Empty means
+    those of the command."""
+
+    if not TYPE_CHECKING:  # type checkers report unknown attributes themselves
+
+        def __getattr__(self, name: str) -> Any:
+            """Raises an error that names the attribute that is meant."""
+            if hasattr(type(self), name):  # a property has raised an AttributeError
+                return object.__getattribute__(self, name)
+            from phonotaxis.other_names import of_result
+
+            known = {*dir(type(self)), *vars(self)}
+            hint = of_result(name, (each for each in known if each[0] != "_"))
+            kind = type(self).__name__
+            raise AttributeError(f"{kind!r} object has no attribute {name!r}{hint}")
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -83,6 +100,24 @@ class Result(Output):
             self.write({**self.document(), "out": str(shown)}, partial)
         return shown
 
+    def save_figures(self, directory: str | Path) -> list[Path]:
+        """Writes all figures as PDF, SVG and PNG files, for papers.
+
+        Args:
+            directory: Directory, which is created if it does not exist.
+
+        Returns:
+            Paths of the files.
+        """
+        from analysis.report.figure_files import write_figures
+
+        return write_figures(self.figures(), Path(directory))
+
+    def figures(self) -> dict[str, Figure]:
+        """Draws all figures of the result, by name; those of ``plot`` at least."""
+        figures = self.plot()
+        return figures if isinstance(figures, dict) else {"figure": figures}
+
 
 Output_co = TypeVar("Output_co", bound=Output, covariant=True)
 
@@ -103,6 +138,8 @@ class Prepared(Generic[Output_co]):
     """Amount of work that earlier runs of the command have already done."""
     left: Callable[[], str] = str
     """Returns a text about files that remain after an interrupt; it can be empty."""
+    stay: Callable[[], None] | None = None
+    """Goes on after the command has printed its result, until an interrupt."""
 
 
 def ignore(done: Any) -> None:

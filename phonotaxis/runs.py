@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, fields, replace
@@ -22,6 +23,7 @@ from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pydrake.geometry import Meshcat
 
 __all__ = ["RunResult", "simulate"]
 
@@ -109,6 +111,14 @@ class RunResult(diagrams.RunResult, Result):
                 f"result.robots[{next(iter(self.several))!r}].plot('time_series')",
             )
         return plot_time_series(self, Proximity(self).clearance)
+
+    def figures(self) -> dict[str, Figure]:
+        """Draws the run from above, and the time series of each robot, by name."""
+        names = {name: f"time_series_{name}" for name in self.several}
+        return {"trajectory": self.plot()} | {
+            names.get(name, "time_series"): own.plot("time_series")
+            for name, own in self.robots.items()
+        }
 
     def replay(self, path: str | Path) -> Path:
         """Writes an HTML page that replays the run in a browser, without a network.
@@ -215,6 +225,8 @@ def simulate(
     audio: RunAudio | None = None,
     save_audio: str | Path | None = None,
     movie: str | Path | None = None,
+    meshcat: Meshcat | None = None,
+    rate: float | None = None,
     **fields: Any,
 ) -> RunResult:
     """Runs a scenario to its end.
@@ -240,6 +252,10 @@ def simulate(
             loudspeakers play. None means that no sound is saved.
         movie: New .gif or .mp4 file for a movie of the run from above. None means no
             movie.
+        meshcat: Drake's 3D viewer, which shows the run while it is computed, for
+            example ``pydrake.geometry.StartMeshcat()``. It needs the engine ``drake``.
+        rate: Greatest ratio of simulated time to real time with ``meshcat``, >= 0. The
+            default 1 is real time, and 0 is as fast as possible.
         **fields: Further fields of the scenario to change. They override ``settings``.
 
     Returns:
@@ -257,6 +273,8 @@ def simulate(
         audio=audio,
         saved=SavedAudio(save_audio, scenario) if save_audio is not None else None,
         movie=SavedMovie(movie, scenario) if movie is not None else None,
+        meshcat=meshcat,
+        rate=rate,
     )
     return prepared.run(progress or ignore)
 
@@ -268,6 +286,8 @@ def prepare_simulation(
     audio: RunAudio | None = None,
     saved: SavedAudio | None = None,
     movie: SavedMovie | None = None,
+    meshcat: Meshcat | None = None,
+    rate: float | None = None,
 ) -> Prepared[RunResult]:
     """Checks a scenario, and builds what a run needs; see ``simulate``.
 
@@ -277,11 +297,23 @@ def prepare_simulation(
         audio: Open files for the sound, see ``simulate``.
         saved: Sound files that the run writes, or None.
         movie: Movie that the run writes, or None.
+        meshcat: Drake's 3D viewer that shows the run, or None.
+        rate: Ratio of simulated time to real time, see ``simulate``.
 
     Returns:
         The work, which returns the result of the run.
+
+    Raises:
+        InputError: The scenario, a file or the rate is not valid, or the engine cannot
+            show the run.
     """
     check_files(scenario)
+    if meshcat is not None and (engine or scenario.engine) == "compiled":
+        raise InputError(
+            "engine",
+            "the compiled engine cannot show a run while it is computed; use drake",
+        )
+    realtime_rate = _realtime_rate(rate, live=meshcat is not None)
     for warning in warnings_of(scenario):
         logging.getLogger("phonotaxis").warning("%s", warning)
     follower = None
@@ -289,6 +321,10 @@ def prepare_simulation(
         diagrams.prepared_loop(scenario)
     else:
         follower = diagrams.build_sound_follower(scenario, log=True)
+    if meshcat is not None and follower is not None:
+        from analysis.views.live_view import with_live_view
+
+        follower = with_live_view(follower, meshcat)
 
     def run(progress: Callable[[float], None]) -> RunResult:
         with movie.sound(saved) if movie else nullcontext(saved) as sound:
@@ -300,6 +336,7 @@ def prepare_simulation(
                         follower=follower,
                         progress=progress,
                         audio=files,
+                        realtime_rate=realtime_rate,
                     )
                 )
             if movie is not None:
@@ -316,3 +353,20 @@ def prepare_simulation(
         unit="s simulated",
         left=saved.left if saved else str,
     )
+
+
+def _realtime_rate(rate: float | None, *, live: bool) -> float:
+    """Returns the ratio of simulated time to real time; 0 is as fast as possible."""
+    if not live:
+        if rate is not None:
+            raise InputError(
+                "rate", f"{rate:g} needs a live view; give meshcat, too, or remove it"
+            )
+        return 0.0
+    if rate is None:
+        return 1.0
+    if not (math.isfinite(rate) and rate >= 0.0):
+        raise InputError(
+            "rate", f"is {rate:g}; give 1 for real time, or 0 for the fastest"
+        )
+    return float(rate)

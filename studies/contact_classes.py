@@ -67,7 +67,7 @@ def _touched(hits: pd.DataFrame, plan: SweepPlan) -> tuple[int, int]:
         assert run.collision is not None, f"run {index} touches nothing any more"
         body = run.surroundings.bodies[run.collision.object]
         x, y, theta = run.poses("WB")[-1]
-        dx, dy = nearest_point_on_rectangle((x, y), body.rectangle(run.time[-1]))
+        dx, dy = nearest_point_on_rectangle((x, y), body.rectangles(run.time[-1])[0])
         ahead += rotate(-theta, dx, dy)[0] > 0.0
     return ahead, len(hits) - ahead
 

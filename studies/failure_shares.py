@@ -15,10 +15,10 @@ from typing import Any
 from studies.tables import Table
 
 MECHANISMS = (
-    "never heard",
+    "no echo",
     "out of sight",
-    "heard late",
-    "pushed too little",
+    "late echo",
+    "echo in time",
     "jam",
     "held off",
     "swings",

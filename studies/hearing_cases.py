@@ -52,7 +52,7 @@ def _counts(
         if options.kind and options.kind not in name:
             continue
         chosen = [c for c in cases if not options.case or options.case in c.name]
-        outcomes = [(case, case.judge()) for case in chosen]
+        outcomes = [(case, case.outcome()) for case in chosen]
         counts = [
             len(outcomes),
             sum(outcome.right for _, outcome in outcomes),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from diagrams.building.laws import make_controller
 from diagrams.scenario.scenario import Scenario
+from phonotaxis.testing import Bench
 
 
 def block_force(scenario: Scenario, distance_m: float, approach_m_s: float) -> float:
@@ -17,16 +18,15 @@ def block_force(scenario: Scenario, distance_m: float, approach_m_s: float) -> f
     Returns:
         Force away from the obstacle, N.
     """
-    block = make_controller(scenario)
-    context = block.CreateDefaultContext()
-    for name, value in (
-        ("p_WS_estimated", [0.0] * 2), ("pose_WB_estimated", [0.0] * 3),
-        ("v_WP", [0.0] * 2), ("target_valid", [0.0]), ("features", [1.0, 0.0, 0.0]),
-    ):  # fmt: skip
-        block.GetInputPort(name).FixValue(context, value)
-    vectors = block.GetInputPort("collision_vectors_B")
     before = distance_m + approach_m_s * scenario.tick_s
-    vectors.FixValue(context, [before, 0.0, 0.0, 0.0, 0.0, 0.0])
-    context.SetDiscreteState(block.EvalUniquePeriodicDiscreteUpdate(context))
-    vectors.FixValue(context, [distance_m, 0.0, 0.0, 0.0, 0.0, 0.0])
-    return -float(block.GetOutputPort("forces_W").Eval(context)[2])
+    at = Bench(
+        make_controller(scenario),
+        p_WS_estimated=[0.0] * 2,
+        pose_WB_estimated=[0.0] * 3,
+        v_WP=[0.0] * 2,
+        target_valid=0.0,
+        features=[1.0, 0.0, 0.0],
+        collision_vectors_B=[before, 0.0, 0.0, 0.0, 0.0, 0.0],
+    )
+    at.tick().set(collision_vectors_B=[distance_m, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return -float(at.output("forces_W")[2])

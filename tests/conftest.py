@@ -90,7 +90,7 @@ def made_once(
     return folder_of
 
 
-#: Chromium without a window: no call home, and no way out, for every name is
+#: Chromium without a window: no call home, and no way out, for every other name is
 #: unknown and the proxy is nowhere.
 _CHROMIUM_FLAGS = (
     "--headless=new",
@@ -101,7 +101,7 @@ _CHROMIUM_FLAGS = (
     "--disable-component-update",
     "--disable-sync",
     "--enable-logging=stderr",
-    "--host-resolver-rules=MAP * ~NOTFOUND",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE localhost",
     "--proxy-server=127.0.0.1:9",
     "--window-size=900,600",
 )

@@ -37,6 +37,18 @@ def test_the_page_of_a_comparison(folder, browser, check_page):
     assert phonotaxis.main(words) == 0
     check_page(out / "report.html")
     _check_links(browser, out / "report.html")
+    _check_fades(browser, out / "report.html")
+
+
+def _check_fades(browser: Any, path: Path) -> None:
+    """On a phone, exactly the boxes that scroll fade out, where there is more."""
+    page = browser.new_page(viewport={"width": 390, "height": 844})
+    page.goto(path.as_uri())
+    boxes = page.evaluate("""[...document.querySelectorAll(".wide, .drawing")].map(
+        (box) => [box.scrollWidth > box.clientWidth, ...["left", "right"].map((side) =>
+            parseFloat(getComputedStyle(box).getPropertyValue(`--more-${side}`)))])""")
+    assert {tuple(box) for box in boxes} == {(True, 0, 48), (False, 0, 0)}
+    page.close()
 
 
 def _check_links(browser: Any, path: Path) -> None:

@@ -97,7 +97,7 @@ def test_laws_lists_names_and_titles(capsys):
         (["--set", "robot.wheel_radius_m=-0.06"], "robot.wheel_radius_m", "greater"),
         (["--set", "microphones.snr_db_at_1m=.nan"], "microphones.snr_db_at_1m", "fin"),
         (["--set", "seed"], "seed", "key=value"),
-        (["--seed", "1.5"], "seed", "integer"),
+        (["--seed", "1.5"], "seed", "whole number"),
         (["--set", "sound.high_hz=60000"], "sound.high_hz", "lower it"),
         (["--set", "tdoa.band_hz=[300, 60000]"], "tdoa.band_hz.1", "50000"),
         (["--set", "tdoa.band_hz=wide"], "tdoa.band_hz", "found"),

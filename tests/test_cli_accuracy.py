@@ -44,7 +44,7 @@ def test_tables_on_the_terminal(capsys, tmp_path):
     [
         (["--trials", "1"], "trials", "between 2"),
         (["--trials", "many"], "command line", "--trials"),
-        (["--seed", "-3"], "seed", "greater"),
+        (["--seed", "-3"], "seed", "give 0 or more"),
         (["--out", "/dev/null/out"], "out", "name another"),
     ],
 )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from importlib.metadata import version
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -42,7 +44,7 @@ def test_all_faults_are_told_a_line_each(capsys, tmp_path):
     assert (status, out) == (2, "")
     seed, room = complaint.splitlines()
     assert seed.startswith("phonotaxis: seed: is 'x'")
-    assert room.endswith("of a scenario (did you mean 'reverberation_time_s'?)")
+    assert "did you mean 'room.reverberation_time_s'?" in room
     document = json.loads(call(capsys, *words, "--json")[1])
     assert document["error"] == document["errors"][0]
     assert [each["field"] for each in document["errors"]] == [
@@ -58,7 +60,7 @@ def test_all_faults_are_told_a_line_each(capsys, tmp_path):
         (["simulate", "--velocity-therm", "printed"], "--velocity-term"),
         (["simulate", "two_static_obstacle"], "two_static_obstacles"),
         (["simulate", "--law", "activ"], "active"),
-        (["simulate", "--set", "source.spee_m_s=1"], "speed_m_s"),
+        (["simulate", "--set", "source.spee_m_s=1"], "source.speed_m_s"),
     ],
 )
 def test_near_misses_are_named(capsys, words, meant):
@@ -71,9 +73,12 @@ def test_near_misses_are_named(capsys, words, meant):
     ("words", "end"),
     [
         (["simulate", "--sed", "3"], " (did you mean '--seed'?)"),
-        (["simulate", "--runs", "10"], " (--runs is an option of compare, falsify)"),
+        (
+            ["simulate", "--runs", "10"],
+            "of compare, sweep, falsify)",
+        ),
         (["locate", "a.wav", "--array", "x"], " (did you mean '--geometry'?)"),
-        (["design", "--law", "active"], "; write --set law=active"),
+        (["accuracy", "--guard", "on"], "simulate, compare, stability, sweep, design)"),
     ],
 )
 def test_options_are_near_to_those_of_the_same_command(capsys, words, end):
@@ -90,6 +95,34 @@ def test_examples_of_the_help_are_commands():
         for example in command.examples:
             words = example.partition(" > ")[0].replace("'", "").split()
             assert make_parser().parse_args(words).command == command.name
+
+
+def test_init_copies_the_template_once(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = call(capsys, "init", "my_robot", "--json")
+    template = Path(phonotaxis.__file__).parent / "template"
+    assert status == 0
+    for file in json.loads(out)["files"]:
+        original = template / Path(file).relative_to("my_robot")
+        assert Path(file).read_text() == original.read_text()
+    assert len(json.loads(out)["files"]) == 8
+    status, _, complaint = call(capsys, "init", "my_robot")
+    assert status == 2
+    assert "my_robot cannot be written (File exists); name a new" in complaint
+
+
+def test_init_gives_a_project_the_name_of_its_directory(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = call(capsys, "init", "Ear-Bot", "--json")
+    files = [Path(file) for file in json.loads(out)["files"]]
+    assert status == 0
+    assert Path("Ear-Bot/ear_bot/laws.py") in files
+    assert 'name = "ear-bot"' in Path("Ear-Bot/pyproject.toml").read_text()
+    assert not [file for file in files if "my_robot" in file.read_text()]
+    for name in ("analysis", "2nd"):
+        status, _, complaint = call(capsys, "init", name)
+        assert (status, Path(name).exists()) == (2, False)
+        assert "write for example phonotaxis init my_robot" in complaint
 
 
 def test_version(capsys):
@@ -123,3 +156,36 @@ def test_result_directory_has_what_an_editor_needs(tmp_path):
     assert first == "# yaml-language-server: $schema=scenario.schema.json"
     assert (tmp_path / "scenario.schema.json").read_text() == schema_text()
     assert load_scenario(tmp_path / "scenario.yaml") == load_scenario("u_trap")
+
+
+def test_the_scenario_of_a_result_begins_with_what_differs(tmp_path):
+    """The comments are settings: on all defaults, they make the same scenario."""
+    from diagrams import write_scenario
+    from diagrams.scenario.differences import differences
+
+    changed = load_scenario({"law": "conventional", "source": {"speed_m_s": 0.2}})
+    write_scenario(changed, tmp_path)
+    text = (tmp_path / "scenario.yaml").read_text("utf-8")
+    lines = text.partition("# All fields:")[0].splitlines()
+    assert lines[1:] == [
+        "# Fields that differ from their defaults:",
+        '#   law: "conventional"',
+        "#   source.speed_m_s: 0.2",
+    ]
+    assert load_scenario(tmp_path) == changed
+    for name in ("u_trap", "robots_4", "odor_search"):
+        whole = load_scenario(name, seed=3)
+        names = {"name": whole.name, "description": whole.description}
+        again = load_scenario(_tree(differences(whole) | names))
+        assert again == whole
+
+
+def _tree(settings):
+    data: dict[str, Any] = {}
+    for path, value in settings.items():
+        *parents, last = path.split(".")
+        node = data
+        for part in parents:
+            node = node.setdefault(part, {})
+        node[last] = value
+    return data

@@ -20,7 +20,7 @@ ROOT = Path(phonotaxis.__file__).parents[1]
 SHORT = ("--set", "duration_s=0.05", "--set", "hearing=ideal")
 FIVE_LAWS = """
 import functools, math, sys
-def two(c, s): return 1.0
+def one(c): return 1.0
 def none(c, s, laws): pass
 def nan(c, s, laws): return float("nan")
 def text(c, s, laws): return "1"
@@ -100,7 +100,7 @@ def test_a_value_error_of_the_program_is_a_bug(capsys, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("two", "takes 2 positional arguments"),
+        ("one", "takes 1 positional argument"),
         ("none", "returns None"),
         ("nan", "returns nan"),
         ("text", "returns '1' (str)"),

@@ -5,10 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import soundfile
 
 import phonotaxis
 from diagrams import load_scenario
+from diagrams.scenario.warnings.warnings_of import warnings_of
+from systems.framework.input_error import InputError
+from tests import guesses
 
 SHORT = ("--set", "duration_s=0.05", "--set", "hearing=ideal", "--no-plots")
 
@@ -19,97 +24,68 @@ def call(capsys, *words: str) -> tuple[int, str, str]:
     return status, printed.out, printed.err
 
 
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        ("plot", "phonotaxis results"),
-        ("view", "phonotaxis results"),
-        ("open", "phonotaxis results"),
-        ("replay", "phonotaxis results"),
-        ("report", "phonotaxis results"),
-        ("movie", "phonotaxis simulate --movie FILE.mp4"),
-        ("init", "phonotaxis scenarios default --copy my_scenario.yaml"),
-        ("new", "phonotaxis scenarios default --copy my_scenario.yaml"),
-        ("validate", "phonotaxis scenarios"),
-        ("check", "phonotaxis scenarios"),
-        ("docs", "phonotaxis COMMAND --help"),
-        ("config", "phonotaxis fields"),
-        ("linearize", "phonotaxis stability"),
-        ("record", "phonotaxis listen"),
-        ("simulat", "'simulate'"),
-        ("swep", "'sweep'"),
-        ("simulate --duration 20", "--set duration_s=20"),
-        ("simulate --duration_s 20", "--set duration_s=20"),
-        ("simulate --duration=20", "--set duration_s=20"),
-        ("simulate --hearing ideal", "--set hearing=ideal"),
-        ("simulate --speed 0.5", "--set source.speed_m_s=0.5"),
-        ("simulate --tick-s 0.05", "--set tick_s=0.05"),
-        ("simulate --name mine", "--set name=mine"),
-        ("simulate --follow-distance 1", "--set attraction.follow_distance_m=1"),
-        ("simulate --noise 0", "phonotaxis fields noise"),
-        ("simulate --obstacles 3", "phonotaxis fields obstacles"),
-        ("simulate --room", "phonotaxis fields room"),
-        ("simulate --scenario u_trap", "phonotaxis simulate u_trap"),
-        ("simulate --gui", "replay.html"),
-        ("simulate --realtime", "replay.html"),
-        ("simulate --plot", "--no-plots"),
-        ("simulate --verbose", "--debug"),
-        ("simulate -v", "--debug"),
-        ("simulate --no-audio", "--save-audio"),
-        ("simulate --output x", "--out"),
-        ("simulate --wav x.wav", "--sound"),
-        ("simulate --runs 10", "compare"),
-        ("simulate source.speed_m_s=0.5", "--set source.speed_m_s=0.5"),
-        ("simulate --set speed=0.5", "source.speed_m_s"),
-        ("simulate --set source.speed=0.5", "speed_m_s"),
-        ("simulate --set robot.width=0.5", "width_m"),
-        ("simulate --set obstacles.cart.speed_m_s=1", "use 'box'"),
-        ("compare --laws active dwa", "--law a,b"),
-        ("design --law active", "--set law=active"),
-        ("locate a.wav --array x", "--geometry"),
-        ("listen --list-devices", "phonotaxis doctor"),
-        ("laws activ", "'active'"),
-        ("scenarios corider", "'corridor'"),
-        ("scenarios --copy mine.yaml", "phonotaxis scenarios default --copy mine.yaml"),
-    ],
-)
-def test_a_wrong_guess_is_answered_by_the_line_to_type(
-    capsys, tmp_path, monkeypatch, words, line
-):
+WORDS = guesses.NOTED_WORDS | guesses.OWN_WORDS
+FILES = guesses.NOTED_FILES | guesses.OWN_FILES
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """A folder with the files that the guesses name."""
     monkeypatch.chdir(tmp_path)
-    status, out, complaint = call(capsys, *words.split())
-    assert (status, out) == (2, "")
-    assert complaint.count("\n") == 1
-    assert line in complaint
-    assert not list(tmp_path.iterdir())
+    sound = 0.1 * np.random.default_rng(1).standard_normal((4_000, 4))
+    soundfile.write("four.wav", sound, 48_000)
+    Path("used").mkdir()
+    for name, text in {
+        "text.txt": "no sound",
+        "own.yaml": "duration_s: 1",
+        "sweep.yaml": "runs: 1",
+        "used/scenario.yaml": "duration_s: 1",
+        "few.yaml": "microphones: [[0, 0], [0, 0]]",
+        "centimeters.yaml": "microphones: [[0, 0], [0, 4000], [4000, 0]]",
+    }.items():
+        Path(name).write_text(text, "utf-8")
+    return tmp_path
 
 
-@pytest.mark.parametrize(
-    ("words", "printed"),
-    [
-        ("list", "two_moving_obstacles"),
-        ("show corridor", "1.6 m wide"),
-        ("scenarios corridor", "waypoints_m"),
-        ("laws active", "laws.active.reach_m"),
-        ("results", "phonotaxis simulate"),
-    ],
-)
-def test_a_guess_that_works(capsys, tmp_path, monkeypatch, words, printed):
-    monkeypatch.chdir(tmp_path)
-    status, out, _ = call(capsys, *words.split())
-    assert status == 0
-    assert printed in out
+@pytest.mark.parametrize("words", WORDS)
+def test_a_guess_at_the_prompt(capsys, folder, words):
+    """It works, or one line has what to type, and nothing is written."""
+    before = {path.name for path in folder.iterdir()}
+    status: int | str | None
+    try:
+        status = phonotaxis.main(words.split())
+    except SystemExit as left:
+        status = left.code
+    printed = capsys.readouterr()
+    if status != 0:
+        assert (status, printed.out) == (2, "")
+        assert printed.err.count("\n") == 1
+        assert {path.name for path in folder.iterdir()} == before
+    assert (WORDS[words] or "") in printed.err + printed.out
 
 
-@pytest.mark.parametrize(
-    ("words", "end"),
-    [("help", "COMMAND"), ("help sweep", "SWEEP.yaml"), ("version", ".")],
-)
-def test_help_and_version_are_words_too(capsys, words, end):
-    with pytest.raises(SystemExit) as left:
-        phonotaxis.main(words.split())
-    assert left.value.code == 0
-    assert end in capsys.readouterr().out
+@pytest.mark.parametrize("text", FILES)
+def test_a_guess_in_a_file(folder, text):
+    Path("guess.yaml").write_text(text, "utf-8")
+    try:
+        answer = str(*warnings_of(load_scenario("guess.yaml")))
+    except InputError as error:
+        answer = str(error)
+    assert (FILES[text] or "") in answer
+    assert answer
+
+
+def test_nine_of_ten_guesses_help():
+    """Of those of the note, of our own, and of each kind; there are over 125."""
+    noted = [guesses.NOTED_WORDS, guesses.NOTED_FILES, guesses.NOTED_PYTHON]
+    own = [guesses.OWN_WORDS, guesses.OWN_FILES, guesses.OWN_PYTHON]
+    for tables in (noted, own, *zip(noted, own, strict=True)):
+        answers = [answer for table in tables for answer in table.values()]
+        assert sum(answer is not None for answer in answers) >= 0.9 * len(answers)
+    every = [answer for table in noted + own for answer in table.values()]
+    assert sum(answer is not None for answer in every) >= 0.95 * len(every)
+    assert sum(map(len, noted)) >= 85
+    assert sum(map(len, own)) >= 40
 
 
 def test_a_copied_scenario_is_the_scenario(capsys, tmp_path, monkeypatch):

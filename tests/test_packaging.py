@@ -12,6 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+TEMPLATE = ROOT / "phonotaxis" / "template"
 PACKAGES = ("systems", "diagrams", "analysis", "phonotaxis")
 
 
@@ -26,6 +27,8 @@ def imported() -> set[str]:
     found: set[str] = set()
     for package in PACKAGES:
         for path in (ROOT / package).rglob("*.py"):
+            if TEMPLATE in path.parents:  # a project of its own
+                continue
             for node in ast.walk(ast.parse(path.read_text("utf-8"))):
                 if isinstance(node, ast.Import):
                     found |= {alias.name.partition(".")[0] for alias in node.names}
@@ -59,15 +62,29 @@ def test_every_file_that_is_no_code_goes_along() -> None:
         for home in (PACKAGES if package == "*" else [package.replace(".", "/")])
         for pattern in patterns
         for path in (ROOT / home).glob(pattern)
+        if path.is_file()
     }
     files = {
         path
         for package in PACKAGES
         for path in (ROOT / package).rglob("*")
-        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
+        if path.is_file() and "__pycache__" not in path.parts
+        if path.suffix != ".py" or TEMPLATE in path.parents
     }
     assert len(files) > 40
     assert files == declared
+
+
+def test_the_template_depends_on_this_version() -> None:
+    project = tomllib.loads((TEMPLATE / "pyproject.toml").read_text("utf-8"))["project"]
+    version = PROJECT["project"]["version"]
+    minor = version.rpartition(".")[0]
+    assert project["dependencies"] == [f"phonotaxis>={minor}"]
+    workflow = (TEMPLATE / ".github/workflows/tests.yml").read_text("utf-8")
+    page = (ROOT / "docs" / "use_in_your_project.md").read_text("utf-8")
+    for text in (workflow, page):
+        assert re.findall(r"phonotaxis@v([\d.]+)", text)
+        assert {*re.findall(r"phonotaxis@v([\d.]+)", text)} == {version}
 
 
 def index_page(readme: str) -> str:

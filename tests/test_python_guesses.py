@@ -9,7 +9,9 @@ import pytest
 
 import phonotaxis
 from phonotaxis import InputError
+from systems import Block
 from systems.laws.catalog import LAWS
+from tests import guesses
 
 SHORT: dict[str, Any] = {"duration_s": 0.2, "hearing": "ideal"}
 
@@ -36,6 +38,33 @@ def test_fields_are_keywords():
     assert result.metrics == result.document()["metrics"]
 
 
+def soft(c, s, push_n=14.0, reach_m=0.45):
+    return push_n * 2.0 ** (-c / reach_m)
+
+
+class Still(Block):
+    """A block of a user's."""
+
+    part = "still"
+
+
+def test_functions_and_classes_are_laws_and_blocks():
+    """And their arguments are fields; ``tests/diagrams/scenario`` has the details."""
+    own: Any = phonotaxis.load_scenario("default", law=soft, blocks=[Still])
+    assert own.law == f"{__name__}:soft"
+    assert own.blocks == (f"{__name__}:Still",)
+    ways: list[Any] = [
+        own.with_({"own_gains.push_n": 3}),
+        own.with_(own_gains={"push_n": 3.0}),
+        phonotaxis.Scenario(own_gains={"push_n": 3.0}),
+        phonotaxis.load_scenario("default", ["own_gains.push_n=3"]),
+    ]
+    assert all(way.own_gains == {"push_n": 3.0} for way in ways)
+    for guess in ({"own_gain.push_n": 3}, {"gains.push_n": 3}, {"soft.push_n": 3}):
+        with pytest.raises(InputError, match="is not a field"):
+            own.with_(guess)
+
+
 def test_dotted_paths_are_keywords_too():
     scenario: Any = phonotaxis.load_scenario("default")
     faster = scenario.with_(**{"source.speed_m_s": 0.2, "obstacles.box.size_m": [1, 1]})
@@ -58,7 +87,7 @@ def test_assignment_names_the_copy():
             setattr(changed, name, "active")
     with pytest.raises(AttributeError, match="lawn"):
         getattr(scenario, "law" + "n")
-    with pytest.raises(InputError, match=r"lawn: is not a field .*did you mean 'law'"):
+    with pytest.raises(InputError, match=r"lawn: did you mean 'law'"):
         scenario.with_(lawn="active")
     with pytest.raises(InputError, match="law: 'activ' is not known"):
         phonotaxis.Scenario(law="activ")
@@ -80,7 +109,9 @@ def test_lists_are_tables_in_notebooks():
     assert laws._repr_html_().count("<tr>") == len(laws)
 
 
-@pytest.mark.parametrize("laws", ["all", "active,conventional", ["active"], "active"])
+@pytest.mark.parametrize(
+    "laws", ["all", "active,conventional", ["active"], "active", soft, [soft, "active"]]
+)
 def test_laws_are_named_alike_everywhere(laws, monkeypatch):
     """One name, a list, a text with commas, or all: in stability and comparisons."""
     from analysis.batches.comparison_plans import comparison_plan
@@ -101,3 +132,29 @@ def test_laws_are_named_alike_everywhere(laws, monkeypatch):
     found.clear()
     phonotaxis.stability("default", law=laws)
     assert found
+
+
+PYTHON = guesses.NOTED_PYTHON | guesses.OWN_PYTHON
+
+
+@pytest.fixture(scope="module")
+def result() -> phonotaxis.RunResult:
+    return phonotaxis.simulate("default", SHORT, duration_s=2.0)
+
+
+@pytest.mark.parametrize("code", PYTHON)
+def test_a_guess_in_python(code, result):
+    from analysis.batches.comparison_plans import comparison_plan
+
+    names = {
+        "phonotaxis": phonotaxis,
+        "comparison_plan": comparison_plan,
+        "result": result,
+        "scenario": result.scenario,
+        "SHORT": SHORT,
+    }
+    try:
+        answer = repr(eval(code, names))
+    except (AttributeError, TypeError, InputError) as error:
+        answer = str(error)
+    assert (PYTHON[code] or "") in answer

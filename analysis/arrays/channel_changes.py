@@ -37,12 +37,19 @@ _LEAST, _MANY = 3, 12
 # lost, and in standard deviations.
 _LEAST_SAMPLES, _DEVIATIONS = 0.7, 6.0
 
+# Jumps of fewer samples than _FEW are within _OFF_WHOLE of a whole number.
+_FEW, _OFF_WHOLE = 3.0, 0.2
+
 # Largest error of the delays that a jump explains: the smaller one of a share of the
 # jump and a share of the longest delay, in addition to standard deviations.
 _SHARE, _STILL, _WITHIN = 0.15, 0.1, 3.0
 
 # Least share of the stretches that keep their delays on either side of a jump.
 _KEPT = 0.8
+
+# Error of the delay of a stretch of speech in a room, s. Delays differ by this, and by
+# a quarter of the jump, from those on their side of the jump.
+_ROOM_S = 1e-5
 
 # Least standard deviation of a delay, as a share of the sample interval.
 _FLOOR_SAMPLES = 0.05
@@ -178,7 +185,7 @@ def _time_of(jump: _Jump, delays: ChannelDelays) -> float | None:
     lags, times = lags[heard], delays.t_s[heard]
     middle = 0.5 * (jump.before + jump.after)[jump.across]
     side = np.sign(jump.after - jump.before)[jump.across]
-    near = 0.25 * abs(jump.step_s)
+    near = min(0.5 * abs(jump.step_s), 0.25 * abs(jump.step_s) + _ROOM_S)
     is_after = np.nanmedian((lags - middle) * side, axis=1) > 0.0
     # The best split has the most stretches on the right sides.
     wrong = np.cumsum(np.where(is_after, 1, -1))
@@ -234,11 +241,15 @@ def _jump_at(split: int, delays: ChannelDelays, search: LagSearch) -> _Jump | No
         return None
     steps = np.where(first[i], change, -change)[across]
     step = float(np.median(steps))
+    samples = abs(step) * rate
+    whole = samples > _FEW or abs(samples - round(samples)) < _OFF_WHOLE
     significance = abs(step) / float(np.median(std[across]))
     alike = np.all(np.abs(steps - step) <= error[across])
     within = known & (first[i] == first[j])
     still = within.any() and np.all(stays[within])
-    if not (alike and still) or significance < _DEVIATIONS:
+    # Some path of a near source explains any possible delays of three channels.
+    moved = count == 3 and np.all(np.abs(after[across]) <= search.allowed_s[across])
+    if moved or not (alike and still and whole) or significance < _DEVIATIONS:
         return None
     # A source that moves leaves the delays of the other channels by chance only.
     chance = float(np.median((error / search.allowed_s)[within])) ** (count - 2)

@@ -10,7 +10,7 @@ from typing import Literal
 FaultKind = Literal[
     "nan", "dead", "apart", "copied", "clipped", "inverted", "directional", "swapped",
     "near", "geometry", "units", "speed", "size", "late", "unaligned", "slipped",
-    "drift", "moves", "tone", "reflector"
+    "drift", "moves", "tone", "reflector", "echo"
 ]  # fmt: skip
 
 

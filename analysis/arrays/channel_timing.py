@@ -60,8 +60,13 @@ _ALLOWED = 1.15
 _OTHER_UNITS = 3.5
 
 # Largest misfit of a wave front, as a share of the longest delay. Near sources cause
-# curved wave fronts.
-_FLAT = 0.15
+# curved wave fronts. The smaller share applies if delays are only a few times too long.
+# An array is flat if its thickness is below the share _THIN of its size.
+_FLAT, _FLATTER, _THIN = 0.15, 0.1, 0.3
+
+# Largest difference between a delay and the sum of two others that agree with it, in
+# addition to two samples, s.
+_AGREE_S = 2e-4
 
 # Strength of the cross-spectrum, as a share of its mean, at which a bin counts half. A
 # tone without noise would otherwise be a matter of its rounding.
@@ -184,24 +189,39 @@ def unaligned_channels(
     lags = search.lags(blocks, reach_s)
     if not np.any(np.abs(lags) > search.allowed_s):
         return None
-    arrival = _arrivals(lags, search.pairs, search.shape.count)
+    arrival = _arrivals(lags, search)
     heard = np.flatnonzero(np.isfinite(arrival))
     t, p = arrival[heard], search.shape.p_AM[heard]
     apart = np.linalg.norm(p[:, np.newaxis] - p, axis=2)
     together = np.abs(t[:, np.newaxis] - t) <= (
         _ALLOWED * apart / search.c + 2.0 / rate
     )
-    _, group = connected_components(together)
-    sizes = np.bincount(group)
-    if sizes.size < 2:
+    number, group = connected_components(together)
+    one = _odd_one(together) if number == 1 else None
+    if number == 1 and one is None:
         return None
+    if one is not None:
+        group = (np.arange(len(t)) == one).astype(np.int32)
+    sizes = np.bincount(group)
     paths = np.abs(t[:, np.newaxis] - t) - 2.0 / rate
     ratio = float((paths * search.c / np.where(apart > 0.0, apart, np.inf)).max())
-    if ratio < _OTHER_UNITS or (sizes.size > 2 and _is_wave(t, p)):
-        # The positions may be wrong.
+    # The positions may be wrong instead.
+    if one is not None or ratio < _OTHER_UNITS:
+        longest_s = _ALLOWED * float(apart.max()) / search.c
+        if 2 * sizes.max() <= len(t) or np.ptp(t) < longest_s or _fits(t, p, search.c):
+            return None
+    elif sizes.size > 2 and (_fits_any(t, p) or _is_wave(t, p, _FLAT)):
         return None
     numbers = np.array(search.numbers)[heard]
     return _late_fault(t, p, numbers, group, search.c)
+
+
+def _odd_one(together: NDArray[np.bool_]) -> int | None:
+    """Returns the only channel without which all pairs of channels are together."""
+    apart = ~together
+    pairs = apart.sum()
+    (odd,) = np.nonzero(2 * apart.sum(axis=0) == pairs)
+    return int(odd[0]) if pairs and odd.size == 1 else None
 
 
 def _late_fault(
@@ -244,29 +264,52 @@ def _ms(seconds: float) -> str:
     return f"{1e3 * abs(seconds):.1f} ms"
 
 
-def _arrivals(
-    lags: NDArray[np.float64], pairs: NDArray[np.int64], count: int
-) -> NDArray[np.float64]:
-    """Returns (n,) times of arrival from the reference that hears most channels.
+def _arrivals(lags: NDArray[np.float64], search: LagSearch) -> NDArray[np.float64]:
+    """Returns (n,) times of arrival from the reference that agrees with most lags.
 
     A channel that this reference does not hear has the value NaN.
     """
+    count = search.shape.count
     later = np.full((count, count), np.nan)
-    later[tuple(pairs.T)] = lags
-    later[tuple(pairs.T[::-1])] = -lags
+    later[tuple(search.pairs.T)] = lags
+    later[tuple(search.pairs.T[::-1])] = -lags
     np.fill_diagonal(later, 0.0)
-    return later[int(np.argmax(np.isfinite(later).sum(axis=1)))]
+    # An echo may be higher than the direct peak of one pair.
+    off = np.abs(later[:, np.newaxis] - later[:, :, np.newaxis] - later)
+    agrees = off < _AGREE_S + 2.0 / search.sample_rate_hz
+    return later[int(np.argmax(agrees.sum(axis=(1, 2))))]
 
 
-def _is_wave(t: NDArray[np.float64], p: NDArray[np.float64]) -> bool:
+def _is_wave(t: NDArray[np.float64], p: NDArray[np.float64], share: float) -> bool:
     """Returns whether a plane wave of any speed explains (n,) times at (n, d) places.
 
-    It does not if it would explain any times.
+    Its largest misfit is a share of the longest delay.
     """
-    centered = p - p.mean(axis=0)
-    rank = int(np.linalg.matrix_rank(centered, tol=1e-3 * float(np.ptp(centered))))
-    if rank >= len(t) - 1:
-        return False
+    centered, inverse = _flattened(p)
     later = t - t.mean()
-    off = later - centered @ (np.linalg.pinv(centered, rcond=1e-3) @ later)
-    return float(np.abs(off).max()) < _FLAT * float(np.ptp(t))
+    off = later - centered @ (inverse @ later)
+    return float(np.abs(off).max()) < share * float(np.ptp(t))
+
+
+def _fits_any(t: NDArray[np.float64], p: NDArray[np.float64]) -> bool:
+    """Returns whether the microphones are so few that a wave explains any times."""
+    return bool(np.linalg.matrix_rank(_flattened(p)[1]) >= len(t) - 1)
+
+
+def _fits(t: NDArray[np.float64], p: NDArray[np.float64], c: float) -> bool:
+    """Returns whether positions in other units explain (n,) times.
+
+    If a wave explains any times, it must be plausibly slow.
+    """
+    if not _fits_any(t, p):
+        return _is_wave(t, p, _FLATTER)
+    slowness = np.linalg.norm(_flattened(p)[1] @ (t - t.mean()))
+    return float(slowness) * c < _OTHER_UNITS
+
+
+def _flattened(
+    p: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns (n, d) centered places, and their inverse without a thin dimension."""
+    centered = p - p.mean(axis=0)
+    return centered, np.linalg.pinv(centered, rcond=_THIN)

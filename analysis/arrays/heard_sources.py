@@ -23,11 +23,8 @@ from analysis.arrays.voting.source_listener import (
     follow_sources,
 )
 from analysis.arrays.voting.track_state import SourceTrack
-from analysis.arrays.voting.vote_peaks import (
-    VotedSource,
-    gather_sources,
-    wrapped,
-)
+from analysis.arrays.voting.vote_bearings import wrapped
+from analysis.arrays.voting.vote_peaks import VotedSource, gather_sources
 from analysis.arrays.voting.vote_records import DirectionVotes, join_votes
 from systems.sound.array_shape import ArrayShape
 

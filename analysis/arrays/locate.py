@@ -17,6 +17,7 @@ from analysis.arrays.heard_calls import arrivals_alike, heard_calls
 from analysis.arrays.heard_sources import HeardSource, HeardSources, heard_sources
 from analysis.arrays.heard_tones import heard_tones, unclear_tone
 from analysis.arrays.locate_result import LocatedSource
+from analysis.arrays.loud_echo import loud_echo
 from analysis.arrays.near_reflector import near_reflector
 from analysis.arrays.prepared_recording import (
     LEAST_SIGHTINGS,
@@ -124,7 +125,7 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
             (spectra.low_hz, spectra.high_hz),
         )
     )
-    return LocatedSource(
+    result = LocatedSource(
         array,
         shape,
         heard.estimates,
@@ -134,6 +135,27 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
         known.largest_range_error,
         recorded.remarks,
     )
+    return replace(result, faults=heard.faults + _echoes(result, heard, known))
+
+
+def _echoes(
+    result: LocatedSource, heard: HeardRecording, array: KnownArray
+) -> list[ChannelFault]:
+    """Returns a fault if the main source of a result is an echo."""
+    main = result.main_source()
+    doubtful = any(fault.kind != "clipped" for fault in heard.faults)
+    if doubtful or main["bearing_deg"] is None:
+        return []
+    if not isinstance(heard.search, RecordingSearch):
+        return []
+    echo = loud_echo(
+        heard.recording,
+        array.shape,
+        array.c,
+        main["bearing_deg"],
+        main["elevation_deg"],
+    )
+    return [] if echo is None else [echo]
 
 
 def _with_errors(source: HeardSource, array: KnownArray) -> HeardSource:

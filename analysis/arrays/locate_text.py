@@ -12,6 +12,8 @@ _WHY_NOTHING = (
     "sound do not match the array, or the source is within 0.2 m of its center"
 )
 
+#: Largest number of rows of the table, so that the summary stays on the screen.
+_MOST_ROWS = 10
 _COLUMNS = (
     ("bearing_deg", "bearing/deg", 11, 2),
     ("bearing_std_deg", "std", 7, 3),
@@ -23,7 +25,10 @@ _COLUMNS = (
 
 
 def locate_text(result: LocatedSource) -> str:
-    """Describes a result by a summary and one row per estimate."""
+    """Describes a result by a summary and a table of estimates.
+
+    The summary is first. If there are many estimates, the rows are evenly spaced.
+    """
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
     if not result.estimates and not result.agreed.sources:
         why = [f"; {f.message}" for f in result.faults if f.kind == "tone"]
@@ -31,7 +36,17 @@ def locate_text(result: LocatedSource) -> str:
     lines = [heard, *_direction(result), _range(result), *_sources(result)]
     lines.append("")
     lines.append("    t/s" + "".join(f"  {name:>{w}}" for _, name, w, _ in _COLUMNS))
-    lines += [_row(estimate) for estimate in result.estimates]
+    estimates = result.estimates
+    shown = [
+        estimates[k * (len(estimates) - 1) // (_MOST_ROWS - 1)]
+        for k in range(_MOST_ROWS if len(estimates) > _MOST_ROWS else 0)
+    ]
+    lines += [_row(estimate) for estimate in shown or estimates]
+    if shown:
+        lines.append(
+            f"{len(shown)} of {len(estimates)} estimates; --json prints all of them, "
+            "and --out DIR writes them to locate.json"
+        )
     return "\n".join(lines)
 
 

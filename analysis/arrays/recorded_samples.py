@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.arrays.array_geometry import ROBOT_ARRAY, ArrayGeometry
 from analysis.arrays.joined_files import join_files
 from systems.framework.input_error import InputError
+from systems.sound.sound_file import LARGEST_SAMPLE
 
 #: A file with all channels, several files in the order of the microphones, or (n,
 #: samples) recorded samples.
@@ -109,6 +110,10 @@ def _given(recording: object, sample_rate_hz: float | None) -> RecordedSamples:
     if not np.isfinite(samples).all() or not samples.any():
         raise InputError(
             "recording", f"{where} is silent or not finite; give recorded samples"
+        )
+    if (most := np.abs(samples).max()) > LARGEST_SAMPLE:
+        raise InputError(
+            "recording", f"{where} has samples up to {most:.1e}; full scale is 1"
         )
     return RecordedSamples(samples, round(sample_rate_hz), where)
 

@@ -74,6 +74,8 @@ class SearchGrid:
     coarseness: float
     """Step of the grid relative to the width of the peaks; 1 if the grid is as fine as
     the peaks."""
+    angle_rad: float
+    """Largest angle between neighboring directions, rad."""
 
     @classmethod
     def of(
@@ -111,6 +113,7 @@ class SearchGrid:
             max_lag=max_lag,
             blur=1 + 2 * np.rint(lag_rate_hz * missed / c).astype(np.int64),
             coarseness=coarseness,
+            angle_rad=_Steps.of(shape, coarseness * path).angle,
         )
 
     def correlations(

@@ -42,7 +42,7 @@ LEAST_BINS, MOST_BINS, USUAL_RUNS = 4, 8, 20
 #: A body was out of sight if its last echo came at least this number of ticks (control
 #: periods) before the contact. The last tick before the contact then had no echo of it.
 OUT_OF_SIGHT_TICKS = 1.5
-#: A body was heard late if its first echo came less than this time before the contact,
+#: An echo was late if the first echo came less than this time before the contact,
 #: s. At the top speed of 0.72 m/s, the robot travels 0.72 m in this time.
 LATE_S = 1.0
 #: Columns that are averaged like metrics.
@@ -236,12 +236,12 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     The reason for a collision depends on the echoes of the body that the robot hit
     (docs/results_laws.md):
 
-    - ``never heard``: The body never caused an echo, because it was never inside the
+    - ``no echo``: The body never caused an echo, because it was never inside the
       cone of a sensor.
     - ``out of sight``: The body caused echoes, but none at the last tick (control
       period) before the contact. The body had left the cones.
-    - ``heard late``: The first echo came less than 1 s before the contact.
-    - ``pushed too little``: The first echo came in time, and the echoes lasted until
+    - ``late echo``: The first echo came less than 1 s before the contact.
+    - ``echo in time``: The first echo came in time, and the echoes lasted until
       the contact. But the law did not push the robot away far enough.
 
     The reasons for the other failures are:
@@ -263,11 +263,11 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     names = names.mask((cause == "stuck") & came, "held off")
     hits = cause == "collision"
     warning, unseen = rows["contact_warning_s"], rows["contact_unseen_s"]
-    names = names.mask(hits, "pushed too little")
-    names = names.mask(hits & (warning < LATE_S), "heard late")
+    names = names.mask(hits, "echo in time")
+    names = names.mask(hits & (warning < LATE_S), "late echo")
     out_of_sight = unseen >= OUT_OF_SIGHT_TICKS * rows["tick_s"]
     names = names.mask(hits & out_of_sight, "out of sight")
-    return names.mask(hits & warning.isna(), "never heard")
+    return names.mask(hits & warning.isna(), "no echo")
 
 
 @dataclass(frozen=True)

@@ -6,17 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 import diagrams
+from analysis.batches.changed_plan import split_settings, with_fields
 from analysis.batches.plan import SweepPlan, load_sweep
-from diagrams.scenario.fields.explain import explain
+from diagrams.scenario.laws_of_kind import chosen_names, is_routed
 from diagrams.scenario.loading import load_scenario, read_mapping
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from diagrams.scenario.settings import parse_setting
-from diagrams.scenario.suggestions import law_names
+from diagrams.scenario.suggestions import Laws
 from systems.framework.input_error import InputError
-from systems.laws.catalog import FORCE_LAWS, LAWS, ROUTE_LAWS
+from systems.laws.catalog import FORCE_LAWS, ROUTE_LAWS
 
 #: Names of the scenarios of the papers' experiments.
 EXPERIMENTS = (
@@ -25,7 +24,6 @@ EXPERIMENTS = (
     "one_moving_obstacle",
     "two_moving_obstacles",
 )
-VELOCITY_TERM = "collision_vector.velocity_term"
 _LIBRARY = Path(diagrams.__file__).parent / "layouts"
 #: Fields of a sweep file that a comparison sets itself. A file of layouts, which is a
 #: sweep file otherwise, must not contain them.
@@ -40,7 +38,7 @@ def library_layouts() -> dict[str, Path]:
 def comparison_plan(
     scenario: str,
     *,
-    laws: str | Iterable[str] | None = None,
+    laws: Laws | None = None,
     runs: int = 50,
     seed: int = 1,
     settings: dict[str, Any] | None = None,
@@ -56,9 +54,9 @@ def comparison_plan(
             (a name in the library or a YAML file). A file of layouts is a sweep file
             without ``grid``, ``runs`` and ``pair``. A scenario has a single layout, and
             its runs differ only in their random numbers.
-        laws: Names of the laws. ``all`` means every law for robots of this kind. None
-            means the laws of the papers and driving without avoidance. For a scenario
-            with routes, None means the laws for routes.
+        laws: Names of the laws, or functions and classes. ``all`` means every law for
+            robots of this kind. None means the laws of the papers and driving without
+            avoidance. For a scenario with routes, None means the laws for routes.
         runs: Number of layouts.
         seed: Seed of the layouts and of the noise.
         settings: Values of other fields, by dotted path.
@@ -73,31 +71,22 @@ def comparison_plan(
     plan = _layouts(scenario)
     base = scenario_from_mapping(plan.base)
     _require_one_law(base, plan.base)
-    routed = any(robot.kind == "router" for robot in base.robots.values())
     if laws is None:
-        laws = ROUTE_LAWS if routed else FORCE_LAWS
-    kind = "router" if routed else "follower"
-    every = [name for name, law in LAWS.items() if law.robot == kind and name != "none"]
-    names = law_names(laws)
-    names = [law for name in names for law in (every if name == "all" else [name])]
+        laws = ROUTE_LAWS if is_routed(base) else FORCE_LAWS
     for key, values in (grid or {}).items():
         if isinstance(values, str):  # it would become a list of its letters
             raise InputError(f"grid.{key}", f"is {values!r}; give a list of values")
-    fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
-    fields |= {
+    changed = {
         "set": plan.set | (settings or {}),
         "grid": {
-            "law": tuple(dict.fromkeys(names)),
+            "law": tuple(chosen_names(laws, base)),
             **{k: tuple(v) for k, v in (grid or {}).items()},
         },
         "runs": runs,
         "seed": seed,
         "pair": True,
     }
-    try:
-        return SweepPlan.model_validate(fields)
-    except ValidationError as error:
-        raise explain(error, SweepPlan.model_json_schema(), "a comparison") from None
+    return with_fields(plan, changed, "a comparison")
 
 
 def _require_one_law(base: Scenario, written: Mapping[str, Any]) -> None:
@@ -121,10 +110,9 @@ def _require_one_law(base: Scenario, written: Mapping[str, Any]) -> None:
 def comparison_plans(
     scenarios: Sequence[str] = (),
     *,
-    laws: Iterable[str] | None = None,
-    velocity_terms: str | None = None,
+    laws: Laws | None = None,
     runs: int = 50,
-    seed: str | None = None,
+    seed: int = 1,
     settings: Iterable[str] = (),
     grid: Iterable[str] = (),
 ) -> dict[str, SweepPlan]:
@@ -134,11 +122,10 @@ def comparison_plans(
         scenarios: Scenarios, see ``comparison_plan``. If there are none, the result has
             plans for the experiments of the papers.
         laws: Names of the laws, separated by commas.
-        velocity_terms: Values of ``collision_vector.velocity_term``, separated by
-            commas.
         runs: Number of layouts per scenario.
-        seed: Seed of the layouts and of the noise, a whole number.
-        settings: Texts of the form ``key=value``.
+        seed: Seed of the layouts and of the noise.
+        settings: Texts of the form ``key=value``. Several values of
+            ``collision_vector.velocity_term``, separated by commas, are compared.
         grid: Texts of the form ``key=[value, ...]``.
 
     Returns:
@@ -147,14 +134,8 @@ def comparison_plans(
     Raises:
         InputError: An argument is not valid. The error names the option or the field.
     """
-    fields = dict(parse_setting(text) for text in settings)
-    varied = dict(_listed_values(text) for text in grid)
-    if velocity_terms is not None:
-        terms = velocity_terms.split(",")
-        if len(terms) == 1:
-            fields[VELOCITY_TERM] = terms[0]
-        else:
-            varied[VELOCITY_TERM] = terms
+    fields, compared = split_settings(settings)
+    varied = dict(_listed_values(text) for text in grid) | compared
     plans: dict[str, SweepPlan] = {}
     for scenario in scenarios or EXPERIMENTS:
         name = Path(scenario).stem
@@ -164,7 +145,7 @@ def comparison_plans(
             scenario,
             laws=laws,
             runs=runs,
-            seed=_whole_seed(seed),
+            seed=seed,
             settings=fields,
             grid=varied,
         )
@@ -196,11 +177,3 @@ def _listed_values(text: str) -> tuple[str, list[Any]]:
     if not isinstance(values, list):
         raise InputError(key, f"{values!r} is not a list of values; write [a, b]")
     return key, values
-
-
-def _whole_seed(text: str | None) -> int:
-    if text is None:
-        return 1
-    if not text.isdigit():
-        raise InputError("seed", f"{text!r} is not a whole number; give 0 or more")
-    return int(text)

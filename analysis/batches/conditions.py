@@ -12,6 +12,7 @@ from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Length, NonNegativeLength, Parameters
 from systems.world.plane import beyond_rectangle
+from systems.world.shapes import box
 
 #: Time between two checks of the distances of moving bodies, s.
 STEP_S = 0.1
@@ -49,7 +50,7 @@ class Conditions(Parameters):
             return
         start = scenario.robots[robot].start.position_m
         for name, body in around.bodies.items():
-            away = math.hypot(*beyond_rectangle(start, body.rectangle(0.0)))
+            away = body.distance(start, 0.0)
             if away < self.start_distance_m:
                 raise InputError(
                     "require.start_distance_m",
@@ -58,20 +59,24 @@ class Conditions(Parameters):
                 )
 
     def _check_source(self, scenario: Scenario) -> None:
-        obstacles = [Body(each.path(), each.size_m) for each in scenario.obstacles]
+        obstacles = [Body(each.path(), each.shape()) for each in scenario.obstacles]
         if not self.source_distance_m or not obstacles:
             return
         from analysis.runs.proximity import least_clearances  # compiles code
 
         for name, source in scenario.sources.items():
             # These are planned positions. The source stays within centimeters of them.
-            plan = Body(source.plan(), (source.length_m, source.width_m))
+            plan = Body(source.plan(), box((source.length_m, source.width_m)))
             moves = any(body.path.moves for body in (plan, *obstacles))
             times = np.arange(0.0, scenario.duration_s if moves else STEP_S, STEP_S)
-            least = least_clearances(
-                plan.rectangles(times - source.start_time_s),
-                np.stack([body.rectangles(times) for body in obstacles]),
-            )[1]
+            own = plan.rectangles_over(times - source.start_time_s)[0]
+            begin = plan.path.pose(-source.start_time_s)[:2]
+            least = [
+                -math.inf
+                if body.fills(begin, 0.0)
+                else least_clearances(own, body.rectangles_over(times))[1].min()
+                for body in obstacles
+            ]
             nearest = int(np.argmin(least))
             if least[nearest] < self.source_distance_m:
                 raise InputError(
@@ -87,13 +92,11 @@ class Conditions(Parameters):
         own = scenario.robots[robot]
         goal = around.followed.path.pose(scenario.duration_s)[:2]
         reach = own.follow_distance_m + own.robot.control_point_m
-        boxes = tuple(
-            tuple(body.rectangle(0.0).tolist())
-            for body in around.obstacles.values()
-            if not body.path.moves
-        )
+        still = [body for body in around.obstacles.values() if not body.path.moves]
+        boxes = tuple(tuple(r) for body in still for r in body.rectangles(0.0).tolist())
         start = own.start.position_m
-        if not _has_way(start, goal, reach, boxes, self.way_radius_m):
+        inside = any(body.fills(goal, 0.0) for body in still)
+        if inside or not _has_way(start, goal, reach, boxes, self.way_radius_m):
             raise InputError(
                 "require.way_radius_m",
                 f"obstacles at rest leave no path for a disc of {self.way_radius_m:g} "
@@ -113,7 +116,7 @@ def _has_way(
 ) -> bool:
     from analysis.runs.shortest_path import shortest_path_length  # compiles code
 
-    rectangles = np.array(boxes).reshape(-1, 5)
+    rectangles = np.array(boxes).reshape(-1, 6)
     # The search for the shortest path accepts a start that is nearer than the radius
     # to an obstacle. This check does not.
     away = (math.hypot(*beyond_rectangle(start, box)) for box in rectangles)

@@ -48,6 +48,8 @@ def field_label(path: str, base: Mapping[str, Any] | None = None) -> str:
         words = f"{'xy'[int(places[1])]} of waypoint {int(places[0]) + 1}"
     elif name == "size_m" and len(places) == 1:
         words = ("length", "width", "height")[int(places[0])]
+    elif name == "own_gains" and places:
+        words = f"gain {places[0]}"
     elif places:
         words += f" [{', '.join(places)}]"
     of = " of ".join(filter(None, (_owner(owner, base or {}), robot)))

@@ -18,7 +18,8 @@ from analysis.run_error import RunError
 from analysis.runs.metric_table import run_metrics
 from diagrams import RunResult, Scenario, simulate
 from diagrams.running.stop_rules import Collision
-from diagrams.scenario.own_code import code_of_sweep, is_interrupt
+from diagrams.scenario.own_code import is_interrupt
+from diagrams.scenario.own_versions import code_of_sweep
 from diagrams.scenario.run_parameters import Engine
 from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import shortened

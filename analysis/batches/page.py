@@ -48,6 +48,7 @@ from analysis.report.section import (
     Section,
     Table,
 )
+from analysis.runs.metric_table import METRICS
 from diagrams.running.stop_rules import SUCCESSFUL
 
 #: Limits that keep a page readable.
@@ -95,6 +96,12 @@ def batch_page(batch: Batch, document: dict[str, Any]) -> str:
     )
 
 
+#: Metrics on the page whose averages include only successful runs.
+_OF_SUCCESSES = [
+    metric.title
+    for metric in METRICS.values()
+    if metric.shown and metric.of == "successes"
+]
 _PAIRS = "Pairs of runs on the same layouts; differences, first less second"
 
 
@@ -150,8 +157,10 @@ def _about(batch: Batch, document: dict[str, Any]) -> list[Content]:
         (
             "Brackets and bars are 95 % intervals: Wilson's for rates, order "
             "statistics for medians. A run that raised an error counts as a run "
-            "without success and without collision. docs/metrics.md states which runs "
-            "the average of each metric includes."
+            "without success and without collision. The averages of "
+            f"{' and '.join(_OF_SUCCESSES)} include only successful runs; those of the "
+            "other metrics include all runs without an error. "
+            "`phonotaxis columns --metrics` describes each metric."
         ),
         Files([("summary.json", "the numbers of this page, for programs")]),
     ]

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import pickle
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -21,14 +21,20 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from analysis.batches.conditions import Conditions
 from analysis.batches.distributions import Distribution
 from analysis.batches.sweep_file import read_sweep
+from analysis.report.file_names import distinct_names
 from diagrams.scenario.fields.explain import explain
-from diagrams.scenario.loading import resolve_sound, written_fields
+from diagrams.scenario.loading import (
+    SCENARIO_FILE,
+    resolve_sound,
+    written_fields,
+)
 from diagrams.scenario.own_code import own_files
+from diagrams.scenario.own_objects import require_file, with_names
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from diagrams.scenario.settings import apply_settings, set_fields
 from diagrams.scenario.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Parameters
+from systems.framework.parameters import Line, Parameters
 
 GridValues = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 #: Greatest number of runs. All runs are drawn and checked before the first one starts,
@@ -66,7 +72,7 @@ class SweepPlan(Parameters):
     distribution derives from the drawn number.
     """
 
-    name: str = Field(default="sweep", min_length=1, pattern=r"^[^\n]*$")
+    name: Line = Field(default="sweep", min_length=1)
     """Title of the result page."""
     scenario: str = Field(default="default", min_length=1)
     """Name of a scenario in the library, or path of a YAML file relative to
@@ -94,6 +100,17 @@ class SweepPlan(Parameters):
     """Whether to keep the trajectory of every run."""
     folder: str = Field(default=".", min_length=1, exclude=True)
     """Folder in which relative paths start: the folder of the sweep's file."""
+
+    def __init__(self, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise explain(error, type(self).model_json_schema(), "a sweep") from None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_objects(cls, data: Any) -> Any:
+        return with_names(data)
 
     @model_validator(mode="after")
     def _check_fields(self) -> SweepPlan:
@@ -129,6 +146,8 @@ class SweepPlan(Parameters):
         for part in ("set", "grid"):
             _check_plain(part, getattr(self, part))
         _check_plain("draw", self.model_dump(include={"draw"}, exclude_none=True))
+        for field, name in self._own_names({**self.set, **self.grid}):
+            require_file(name, field, "a sweep runs in several processes")
         return self
 
     @cached_property
@@ -240,26 +259,48 @@ class SweepPlan(Parameters):
         The number of runs influences neither.
         """
         base = scenario_from_mapping(self.base).model_dump(mode="json")
-        document = {**self.model_dump(mode="json", exclude={"runs"}), "base": base}
-        if self.file_digests:
-            document["files"] = self.file_digests
+        # ``base`` has the contents of the scenario, wherever its file is.
+        rest = self.model_dump(mode="json", exclude={"runs", "scenario"})
+        document = {**rest, "base": base}
+        if self.named_digests:
+            document["files"] = self.named_digests
         return hashlib.sha256(json.dumps(document).encode()).hexdigest()
 
     @cached_property
     def file_digests(self) -> dict[str, str]:
         """SHA-256 of each sound file and user's module that the runs use, by path."""
-        values = {**self.base, **self.grid, **self.model_dump(include={"draw"})["draw"]}
         files: set[Path] = set()
-        for field, text in _texts("", values):
-            if field in ("law", "blocks"):
-                files.update(own_files(text, field))
-            elif field in ("file", "ego_noise_file"):
+        for field, text in self._own_names({**self.base, **self.grid}):
+            files.update(own_files(text, field))
+        for field, text in self._all_texts({**self.base, **self.grid}):
+            if field in ("file", "ego_noise_file"):
                 files.add(Path(self.folder, text).resolve())
         return {
             str(path): hashlib.sha256(path.read_bytes()).hexdigest()
             for path in sorted(files)
             if path.is_file()
         }
+
+    def own_names(self) -> list[str]:
+        """Returns the names of all laws and blocks that the runs use, each once."""
+        named = self._own_names({**self.base, **self.grid})
+        return list(dict.fromkeys(name for _, name in named))
+
+    def _own_names(self, fixed: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        for field, text in self._all_texts(fixed):
+            if field in ("law", "blocks"):
+                yield field, text
+
+    def _all_texts(self, fixed: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yields the texts in ``fixed`` and in the draws, with the names of fields."""
+        drawn = self.model_dump(include={"draw"})["draw"]
+        yield from _texts("", {**fixed, **drawn})
+
+    @property
+    def named_digests(self) -> dict[str, str]:
+        """``file_digests`` by names of files, without their folders."""
+        names = distinct_names(Path(path).name for path in self.file_digests)
+        return dict(zip(names, self.file_digests.values(), strict=True))
 
     def _draw_run(
         self, run: int, cells: list[tuple[int, dict[str, Any]]], stream: list[int]
@@ -338,9 +379,15 @@ def load_sweep(path: str | Path) -> SweepPlan:
 
 
 def dump_plan(plan: SweepPlan) -> str:
-    """Writes the plan as YAML, which ``load_sweep`` can load."""
+    """Writes the plan as YAML, which ``load_sweep`` can load.
+
+    If the scenario is a file, the plan names ``scenario.yaml``: a result directory has
+    this file beside the plan, and no path of the machine.
+    """
     document = plan.model_dump(mode="json", exclude_none=True)
-    return dump_yaml({**document, "scenario": plan.source})
+    if plan.source != plan.scenario:
+        document["scenario"] = SCENARIO_FILE
+    return dump_yaml(document)
 
 
 def _paths(key: str) -> list[str]:

@@ -221,7 +221,7 @@ def _errorbars(
     """
     value, low, high = np.array([(each.value, *each.ends) for each in estimates]).T
     spread = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
-    axes.errorbar(
+    drawn = axes.errorbar(
         value if across else places,
         places if across else value,
         xerr=spread if across else None,
@@ -233,9 +233,11 @@ def _errorbars(
         markersize=4,
         capsize=3,
         linewidth=1,
-        transform=axes.transData
-        + ScaledTranslation(shift_pt / 72.0, 0.0, axes.figure.dpi_scale_trans),
     )
+    # Not as an argument, because the limits of the axes would then omit the curve.
+    shift = ScaledTranslation(shift_pt / 72.0, 0.0, axes.figure.dpi_scale_trans)
+    for artist in drawn.get_children():
+        artist.set_transform(axes.transData + shift)
 
 
 def plot_over(

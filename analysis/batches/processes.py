@@ -11,6 +11,7 @@ import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 
 from analysis.batches.one_run import Outcome, Task, lost_outcome
 from analysis.batches.worker import READY
@@ -23,7 +24,17 @@ ATTEMPTS = 2
 AHEAD = 2
 #: Longest time between two calls of ``pulse``, s.
 PULSE_S = 0.25
-_MAIN = "import sys; from analysis.batches.worker import main; main(int(sys.argv[1]))"
+#: Program of a worker. It loads our packages from where this process has them, even if
+#: a module of the user with the same name comes first on the path.
+_PROGRAM = """
+import sys
+sys.path.insert(0, sys.argv[2])
+import analysis, diagrams, systems
+del sys.path[0]
+from analysis.batches.worker import main
+main(int(sys.argv[1]))
+"""
+_HOME = str(Path(__file__).resolve().parents[2])
 
 
 class WorkerError(RunError):
@@ -49,7 +60,7 @@ class WorkerProcess:
         paths = os.pathsep.join(path or os.getcwd() for path in sys.path)  # noqa: PTH109
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", _MAIN, str(theirs.fileno())],
+                worker_command(theirs.fileno()),
                 pass_fds=[theirs.fileno()],
                 env={**os.environ, **threads, **encoding, "PYTHONPATH": paths},
                 stdin=subprocess.DEVNULL,
@@ -99,6 +110,11 @@ class WorkerProcess:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
+
+
+def worker_command(file_descriptor: int) -> list[str]:
+    """Returns the command that starts a worker, which reads tasks from a socket."""
+    return [sys.executable, "-P", "-c", _PROGRAM, str(file_descriptor), _HOME]
 
 
 def run_locally(

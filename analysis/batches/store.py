@@ -32,6 +32,7 @@ from analysis.report.provenance import SCHEMA_VERSION, versions
 from analysis.report.result_directory import whole_directory
 from analysis.run_error import RunError
 from diagrams import write_scenario
+from diagrams.scenario.own_sources import write_own_sources
 from diagrams.scenario.scenario import scenario_from_mapping
 from systems.framework.input_error import InputError, shortened
 
@@ -191,12 +192,13 @@ def _make(out: Path, plan: SweepPlan) -> None:
         (out / "trajectories").mkdir()
     (out / PLAN).write_text(dump_plan(plan), "utf-8")
     base = scenario_from_mapping(plan.base)
-    write_scenario(base, out)
+    write_scenario(base, out, relative=True)
+    write_own_sources(plan.own_names(), out)
     (out / JOURNAL).touch()
     manifest = {
         "schema_version": SCHEMA_VERSION,
         "plan_sha256": plan.digest,
-        "files_sha256": plan.file_digests,
+        "files_sha256": plan.named_digests,
         "versions": versions(),
     }
     (out / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n")
@@ -226,7 +228,7 @@ def _check_same(out: Path, plan: SweepPlan) -> None:
             "out", f"{out} holds no sweep; name the directory of one, or a new one"
         ) from None
     if digest != plan.digest:
-        files = plan.file_digests
+        files = plan.named_digests
         names = sorted({*files, *then})
         parts += [name for name in names if files.get(name) != then.get(name)]
         what = ", ".join(parts) or "the scenario's file"

@@ -12,7 +12,7 @@ from analysis.energy.energy_certificate import EnergyCertificate
 from analysis.energy.velocity_passivity import EnergyBalance
 from analysis.loops.point_mass import PointMass
 from analysis.report.palette import COLORS
-from systems.world.geometry import rectangle_corners
+from systems.world.shapes import rectangle_outline
 
 
 def draw_bodies(axes: Axes, model: PointMass) -> None:
@@ -25,7 +25,7 @@ def draw_bodies(axes: Axes, model: PointMass) -> None:
     for k, rectangle in enumerate(model.rectangles):
         is_source = k == len(model.rectangles) - 1
         color = COLORS["source" if is_source else "obstacle"]
-        axes.add_patch(Polygon(rectangle_corners(rectangle), color=color, zorder=3))
+        axes.add_patch(Polygon(rectangle_outline(rectangle), color=color, zorder=3))
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     ring = model.p_WS + model.follow_distance_m * np.array(
         [np.cos(angle), np.sin(angle)]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydrake.systems.analysis import DiscreteTimeApproximation
 
 from analysis.loops.autodiff import seed, value_and_gradient
+from analysis.loops.diagram_ports import ports_of
 from analysis.loops.diagram_state import set_discrete_state
 from analysis.loops.ideal_loop import IdealLoop
 from analysis.loops.linear_models import LinearModel
@@ -46,7 +47,7 @@ def sampled_blocks(
     held = {
         port.get_name()
         for role in continuous
-        for port in _ports(loop.block(role), "input")
+        for port in ports_of(loop.block(role), "input")
     }
     models = []
     for role, block in loop.follower.blocks.items():
@@ -69,19 +70,13 @@ def sampled_blocks(
     return tuple(models)
 
 
-def _ports(block: Any, kind: str) -> list[Any]:
-    if kind == "input":
-        return [block.get_input_port(k) for k in range(block.num_input_ports())]
-    return [block.get_output_port(k) for k in range(block.num_output_ports())]
-
-
 def _input_values(
     loop: IdealLoop, role: str, state: NDArray[np.float64], time_s: float
 ) -> list[NDArray[np.float64]]:
     """Values at the input ports of a block when the diagram is at ``state``."""
     block = loop.block(role)
     own = block.GetMyContextFromRoot(loop.context(state, time_s))
-    return [port.Eval(own).copy() for port in _ports(block, "input")]
+    return [port.Eval(own).copy() for port in ports_of(block, "input")]
 
 
 def block_model(
@@ -112,23 +107,23 @@ def block_model(
     seeded = seed(np.concatenate([state, *values]))
     context = _context(twin, time_s, seeded[:count])
     start = count
-    for port, value in zip(_ports(twin, "input"), values, strict=True):
+    for port, value in zip(ports_of(twin, "input"), values, strict=True):
         port.FixValue(context, seeded[start : start + len(value)])
         start += len(value)
-    outputs = [port.Eval(context) for port in _ports(twin, "output")]
-    names = [name for port in _ports(ports, "output") for name in _elements(port)]
+    outputs = [port.Eval(context) for port in ports_of(twin, "output")]
+    names = [name for port in ports_of(ports, "output") for name in _elements(port)]
     updated = np.empty(0)
     if count:
         changed = twin.EvalUniquePeriodicDiscreteUpdate(context)
         groups = range(changed.num_groups())
         updated = np.concatenate([changed.get_vector(k).CopyToVector() for k in groups])
     later = _context(twin, time_s, updated)
-    for index, port in enumerate(_ports(ports, "output")):
+    for index, port in enumerate(ports_of(ports, "output")):
         if port.get_name() in held:
             outputs.append(twin.get_output_port(index).Eval(later))
             names += [f"{name}{AFTER}" for name in _elements(port)]
     suffix = AFTER if read_after else ""
-    heard = [name for port in _ports(ports, "input") for name in _elements(port)]
+    heard = [name for port in ports_of(ports, "input") for name in _elements(port)]
     _, by_all = value_and_gradient(updated, start)
     _, read = value_and_gradient(np.concatenate(outputs), start)
     return LinearModel(

@@ -34,7 +34,8 @@ from analysis.loops.operating_points import (
 from analysis.runs.shortest_path import shortest_path_length
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.world.geometry import control_point, rectangle_corners
+from systems.world.geometry import control_point
+from systems.world.shapes import rectangle_outline
 
 #: Equilibria nearer to each other than this are the same, m.
 _SAME_M = 1e-6
@@ -109,7 +110,8 @@ class EquilibriumSearch:
         return self._way(point, self.scenario.only.robot.width_m / 2.0)
 
     def _way(self, point: OperatingPoint, radius: float) -> float:
-        boxes = [body.rectangle(0.0) for body in self.scenario.bodies().values()]
+        bodies = self.scenario.bodies().values()
+        boxes = [row for body in bodies for row in body.rectangles(0.0)]
         radius = min(radius, 0.99 * point.clearance_m)
         return shortest_path_length(self._start, point.p_WP, 0.0, boxes, radius)
 
@@ -378,7 +380,8 @@ class _Found:
 def _area(scenario: Scenario) -> SearchArea:
     margin = scenario.follower.attraction.follow_distance_m + 1.0
     places = [np.array(scenario.only.start.position_m)[None]]
-    places += [rectangle_corners(b.rectangle(0.0)) for b in scenario.bodies().values()]
+    bodies = scenario.bodies().values()
+    places += [rectangle_outline(row) for b in bodies for row in b.rectangles(0.0)]
     everything = np.concatenate(places)
     low, high = everything.min(axis=0) - margin, everything.max(axis=0) + margin
     edges = [low[0], high[0], low[1], high[1]]

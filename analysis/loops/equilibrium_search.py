@@ -53,7 +53,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from analysis.loops.force_field import ForceField
-from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
+from analysis.loops.ideal_scenarios import require_single_rectangles
+from systems.world.geometry import nearest_point_on_rectangle, rotate
+from systems.world.shapes import rectangle_outline
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -163,8 +165,12 @@ class CellSearch:
         scenario = field.loop.scenario
         self.p_WS = field.p_WS
         self._attraction = scenario.follower.attraction
-        self._bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
+        bodies = [*scenario.bodies().values()]
+        self._bodies = [row for body in bodies for row in body.rectangles(0.0)]
+        self._filled = [body for body in bodies if body.shape.polygon is not None]
         adds = scenario.follower.collision_vector.aggregation == "sum"
+        if adds:
+            require_single_rectangles(scenario)
         self._slots = min(_SLOTS if adds else 1, len(self._bodies))
         farthest = field.reach_m + 1.0
         self._c, self._f, self._error = _sampled(field, farthest)
@@ -215,7 +221,7 @@ class CellSearch:
         gap = min(x - area[0], area[1] - x, y - area[2], area[3] - y)
         d_f = self._attraction.follow_distance_m
         pull = self._attraction.stiffness_n_m * (gap - d_f)
-        corners = np.concatenate([rectangle_corners(body) for body in self._bodies])
+        corners = np.concatenate([rectangle_outline(body) for body in self._bodies])
         (x, y), (x0, x1, y0, y1) = corners.T, area
         nearest = float(np.min([x - x0, x1 - x, y - y0, y1 - y]))
         if nearest <= 0.0:
@@ -329,10 +335,20 @@ class CellSearch:
     def _depth(self, points: Floats) -> Floats:
         """(n,) distances of points inside a body from its outline, m; outside: < 0."""
         depth = np.full(len(points), -np.inf)
-        for x, y, theta, length, width in self._bodies:
+        for x, y, theta, length, width, radius in self._bodies:
             u, v = rotate(-theta, points[:, 0] - x, points[:, 1] - y)
-            own = np.minimum(length / 2.0 - np.abs(u), width / 2.0 - np.abs(v))
-            depth = np.maximum(depth, own)
+            u, v = np.abs(u) - length / 2.0, np.abs(v) - width / 2.0
+            # The distance from the rectangle without its radius, negative inside.
+            out = np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0))
+            out += np.minimum(np.maximum(u, v), 0.0)
+            depth = np.maximum(depth, radius - out)
+        for body in self._filled:
+            x, y, theta = body.path.pose(0.0)
+            own = np.stack(rotate(-theta, points[:, 0] - x, points[:, 1] - y), axis=-1)
+            rows = body.rectangles(0.0)
+            away = [np.hypot(*nearest_point_on_rectangle(points.T, r)) for r in rows]
+            deep = np.where(body.shape.fills(own), np.min(away, axis=0), -np.inf)
+            depth = np.maximum(depth, deep)
         return depth
 
     def _pull_slope(self, cells: Floats, radius: float) -> Floats:

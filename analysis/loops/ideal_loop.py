@@ -30,7 +30,7 @@ from analysis.loops.ideal_scenarios import require_ideal
 from diagrams import build_sound_follower
 from diagrams.building.robot import parts_of
 from diagrams.running.simulation import simulator_config
-from diagrams.scenario.own_code import loaded_digests
+from diagrams.scenario.own_versions import loaded_digests
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 

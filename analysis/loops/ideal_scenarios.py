@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagrams.scenario.scenario import Scenario
+from systems.base.driven_path import DrivenPath
 from systems.base.parameters import PlantParameters
 from systems.framework.input_error import InputError
+from systems.world.paths import WaypointPath
 
 _ALL_IDEAL: dict[str, Any] = {
     "hearing": "ideal_always",
@@ -17,6 +19,9 @@ _ALL_IDEAL: dict[str, Any] = {
     # A guard that passes the law's commands unchanged does not affect the loop.
     "guard": None,
 }
+
+#: Fields of a body's schedule, which belong to its waypoints.
+_NO_SCHEDULE = {"pauses_s": [], "waypoint_times_s": [], "at_end": "stop"}
 
 
 def ideal_scenario(scenario: Scenario) -> Scenario:
@@ -30,14 +35,22 @@ def ideal_scenario(scenario: Scenario) -> Scenario:
 
 def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
     """Returns a copy in which all bodies rest where they are at ``time_s``."""
-    x, y, theta = scenario.source.path().pose(time_s)
-    source = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
-    obstacles = []
-    for obstacle in scenario.obstacles:
-        x, y, theta = obstacle.path().pose(time_s)
-        rest = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
-        obstacles.append(obstacle.model_dump() | rest)
+    obstacles = [
+        obstacle.model_dump() | _resting(obstacle.path(), time_s)
+        for obstacle in scenario.obstacles
+    ]
+    source = _resting(scenario.source.path(), time_s)
     return changed(scenario, {"source": source, "obstacles": obstacles})
+
+
+def _resting(path: DrivenPath | WaypointPath, time_s: float) -> dict[str, Any]:
+    """Fields of a body that rests where its path is at a time."""
+    x, y, theta = path.pose(time_s)
+    return {
+        **_NO_SCHEDULE,
+        "waypoints_m": [[x, y]],
+        "heading_deg": math.degrees(theta),
+    }
 
 
 def moving_bodies(scenario: Scenario) -> tuple[str, ...]:
@@ -51,12 +64,32 @@ def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     """Returns a validated copy in which ``changes`` replace fields of the scenario.
 
     If the value of a change is a mapping, it replaces single fields of a group. Any
-    other value replaces the whole field.
+    other value replaces the whole field. New waypoints have no pauses and times.
     """
     data = scenario.model_dump()
     for key, value in changes.items():
-        data[key] = data[key] | value if isinstance(value, dict) else value
+        if not isinstance(value, dict):
+            data[key] = value
+        elif "waypoints_m" in value:
+            data[key] = data[key] | _NO_SCHEDULE | value
+        else:
+            data[key] = data[key] | value
     return Scenario.model_validate(data)
+
+
+def require_single_rectangles(scenario: Scenario) -> None:
+    """Raises InputError if a body is a wall with a corner, or a polygon.
+
+    The models that add the pushes of bodies add those of all rectangles, but such a
+    body pushes with its nearest rectangle only.
+    """
+    for name, body in scenario.bodies().items():
+        if len(body.shape.rectangles) > 1:
+            raise InputError(
+                "collision_vector.aggregation",
+                f"'sum' has no model with {name!r}, which consists of several edges; "
+                "use 'paper' or 'nearest', or a box or a disc instead",
+            )
 
 
 def require_rolling(plant: PlantParameters) -> None:

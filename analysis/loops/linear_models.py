@@ -82,7 +82,10 @@ class LinearModel:
     """Sample period, s. In continuous time: None."""
 
     def to_control(self) -> Any:
-        """Returns the model as a ``control.StateSpace`` with named signals."""
+        """Returns the model as a ``control.StateSpace`` with named signals.
+
+        ``control`` permits no periods in names. They become underscores.
+        """
         import control
 
         return control.ss(
@@ -91,8 +94,8 @@ class LinearModel:
             self.C,
             self.D,
             dt=self.period_s or 0,
-            inputs=list(self.input_names),
-            outputs=list(self.output_names),
+            inputs=[name.replace(".", "_") for name in self.input_names],
+            outputs=[name.replace(".", "_") for name in self.output_names],
             states=[name.replace(".", "_") for name in self.state_names],
             name=self.name.replace(" ", "_"),
         )

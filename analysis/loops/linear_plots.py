@@ -9,7 +9,7 @@ from itertools import cycle
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon
+from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -28,7 +28,7 @@ from analysis.loops.robustness import (
 )
 from analysis.loops.step_response import StepCheck
 from analysis.report.palette import COLORS, draw_grid
-from systems.world.geometry import rectangle_corners
+from analysis.report.shape_patch import shape_patch
 
 #: Marker, color and title of each kind of equilibrium.
 _KINDS = {
@@ -52,8 +52,8 @@ def plot_equilibria(search: EquilibriumSearch) -> Figure:
     )  # fmt: skip
     for name, body in search.scenario.bodies().items():
         color = COLORS["source" if name == "source" else "obstacle"]
-        corners = rectangle_corners(body.rectangle(0.0))
-        axes.add_patch(Polygon(corners, facecolor=color, alpha=0.8))
+        pose = body.path.pose(0.0)
+        axes.add_patch(shape_patch(body.shape, pose, facecolor=color, alpha=0.8))
     drawn = set()
     for point in search.points:
         marker, color, title = _KINDS[point.kind]

@@ -28,7 +28,7 @@ from analysis.loops.linear_models import (
 )
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.world.geometry import control_point, nearest_point_on_rectangle
+from systems.world.geometry import control_point
 
 Kind = Literal["sink", "saddle", "source"]
 
@@ -154,14 +154,7 @@ class OperatingPoint:
 
     def _distances(self) -> list[tuple[str, float]]:
         return [
-            (
-                name,
-                math.hypot(
-                    *nearest_point_on_rectangle(
-                        self.p_WP, body.rectangle(self.time_s).tolist()
-                    )
-                ),
-            )
+            (name, body.distance((self.p_WP[0], self.p_WP[1]), self.time_s))
             for name, body in self.loop.scenario.bodies().items()
         ]
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.loops import point_mass_kernels as kernels
+from analysis.loops.ideal_scenarios import require_single_rectangles
 from analysis.loops.radial_law import RadialLaw, radial_law
 from diagrams import Scenario
 from systems.framework.input_error import InputError
@@ -61,8 +62,8 @@ class PointMass:
     law: RadialLaw
     """Force of the law away from a body, as tables."""
     rectangles: NDArray[np.float64]
-    """(n, 5) bodies in W: x, y, theta, length, width, in m and rad. The body of the
-    source is the last row."""
+    """(n, 6) rectangles (x, y, theta, length, width, radius) of the bodies in W, m and
+    rad. The body of the source is the last row."""
     p_WS: NDArray[np.float64]
     """(2,) position of the source in W, m."""
     p_WP: NDArray[np.float64]
@@ -86,7 +87,7 @@ class PointMass:
         return 0.5 * self.mass_kg * self.top_speed_m_s**2
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
-        """(n, bodies) distances of points (n, 2) from each body, m; 0 inside."""
+        """(n, k) distances of points (n, 2) from k rectangles, m; 0 inside."""
         points = np.asarray(points, dtype=float)
         nearest = [nearest_point_on_rectangle(points.T, r) for r in self.rectangles]
         return np.array([np.hypot(x, y) for x, y in nearest]).T
@@ -96,7 +97,7 @@ class PointMass:
         return self.distances(points).min(axis=1)
 
     def obstacle_energy(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) potential energies of the push, J, at (n, bodies) distances, m."""
+        """(n,) potential energies of the push, J, at (n, k) distances, m."""
         energies = self.law.energy(distances)
         return energies.sum(axis=1) if self.all_bodies else energies.max(axis=1)
 
@@ -180,17 +181,18 @@ class PointMass:
         return self._bodies(), self.p_WS, gains, tables
 
     def _bodies(self) -> NDArray[np.float64]:
-        """(n, 6) bodies: center, cosine and sine of heading, half length and width."""
-        x, y, theta, length, width = self.rectangles.T
+        """(n, 7) center, cosine and sine of heading, half extents, and radius."""
+        x, y, theta, length, width, radius = self.rectangles.T
         half = 0.5 * np.array([length, width])
-        return np.stack([x, y, np.cos(theta), np.sin(theta), *half], axis=1)
+        return np.stack([x, y, np.cos(theta), np.sin(theta), *half, radius], axis=1)
 
 
 def point_mass(scenario: Scenario) -> PointMass:
     """Builds the point-mass model of a scenario. All bodies rest as they are at 0 s.
 
-    Raises InputError if the law is not known or has no radial force, or if the scenario
-    adds the pushes of bodies (``aggregation: sum``) and has more than three bodies.
+    Raises InputError if the law is not known or has no radial force. Also raises it if
+    the scenario adds the pushes of bodies (``aggregation: sum``), and has more than
+    three bodies, or a wall or polygon.
     """
     bodies = scenario.bodies()
     all_bodies = scenario.follower.collision_vector.aggregation == "sum"
@@ -201,7 +203,9 @@ def point_mass(scenario: Scenario) -> PointMass:
             f"{len(bodies)} bodies has no energy; use 'paper' or 'nearest', or fewer "
             "obstacles",
         )
-    rectangles = np.array([body.rectangle(0.0) for body in bodies.values()])
+    if all_bodies:
+        require_single_rectangles(scenario)
+    rectangles = np.concatenate([body.rectangles(0.0) for body in bodies.values()])
     attraction, robot = scenario.follower.attraction, scenario.only.robot
     return PointMass(
         law=radial_law(scenario),

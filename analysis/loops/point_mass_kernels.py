@@ -2,7 +2,8 @@
 
 A world has four parts:
 
-- bodies: (k, 6) rows x, y, cosine and sine of the heading, half length, half width
+- bodies: (k, 7) rows x, y, cosine and sine of the heading, half length, half width,
+  radius
 - position of the source: (2,) in the world frame W, m
 - gains: stiffness K_r, damping D_r, follow distance d_f, mass M, top speed, whether all
   bodies push (0 or 1), and velocity term (0: none, 1: printed, 2: closing)
@@ -22,7 +23,7 @@ from systems.world.geometry import beyond
 
 _Array = NDArray[np.float64]
 _State = tuple[float, float, float, float]
-_Vector = tuple[float, float, float, bool]
+_Vector = tuple[float, float, float, float]
 _Gains = tuple[float, ...]
 _Tables = tuple[_Array, _Array, _Array]
 _World = tuple[_Array, _Array, _Gains, _Tables]
@@ -35,18 +36,27 @@ _SWITCH_PARTS = 32
 @njit(cache=True)
 def _nearest(
     x: float, y: float, body: _Array
-) -> tuple[float, float, float, bool]:  # pragma: no cover  (compiled)
+) -> _Vector:  # pragma: no cover  (compiled)
     """Vector from (x, y) to the nearest point of a body, in W, m.
 
-    The four values are x and y of the vector, its length, and whether the nearest point
-    is a corner of the body.
+    The four values are x and y of the vector, its length, and the rate at which the
+    vector changes if (x, y) moves across it at 1 m/s. The rate is 0 before an edge and
+    1 before a sharp corner.
     """
     dx, dy = x - body[0], y - body[1]
     u, v = body[2] * dx + body[3] * dy, -body[3] * dx + body[2] * dy
     du, dv = -beyond(u, body[4]), -beyond(v, body[5])
     corner = du != 0.0 and dv != 0.0
+    if body[6] > 0.0:
+        far = math.sqrt(du * du + dv * dv)
+        share = max(1.0 - body[6] / max(far, 1e-12), 0.0)
+        # Before a disc, both components of the vector may vanish.
+        corner = corner or (body[4] == 0.0 and body[5] == 0.0)
+        du, dv = share * du, share * dv
+    else:
+        share = 1.0
     cx, cy = body[2] * du - body[3] * dv, body[3] * du + body[2] * dv
-    return cx, cy, math.sqrt(cx * cx + cy * cy), corner
+    return cx, cy, math.sqrt(cx * cx + cy * cy), share if corner else 0.0
 
 
 @njit(cache=True)
@@ -83,15 +93,18 @@ def _radial_force(
     ``vector`` is that of ``_nearest``. ``term`` selects the speed s: 0, |dC/dt| or the
     speed of approach.
     """
-    cx, cy, c, corner = vector
+    cx, cy, c, across = vector
     vx, vy = v_WP
     f = _lookup(tables[0], c)
     if term > 0.5:
         towards = (vx * cx + vy * cy) / max(c, 1e-12)
         if term > 1.5:
             s = max(0.0, towards)
-        elif corner:
+        elif across == 1.0:
             s = math.sqrt(vx * vx + vy * vy)
+        elif across > 0.0:
+            aside = across * (vx * cy - vy * cx) / max(c, 1e-12)
+            s = math.sqrt(towards * towards + aside * aside)
         else:
             s = abs(towards)
         f += _increment(tables[2], c, s)
@@ -115,7 +128,7 @@ def _force(
     fx, fy = pull * dx - damping * vx, pull * dy - damping * vy
     energy = 0.5 * stiffness * (r - follow) ** 2
     least, index = np.inf, -1
-    nearest = (0.0, 0.0, 0.0, False)
+    nearest = (0.0, 0.0, 0.0, 0.0)
     for k in range(bodies.shape[0]):
         vector = _nearest(x, y, bodies[k])
         cx, cy, c, _ = vector

@@ -19,7 +19,7 @@ from pydrake.autodiffutils import AutoDiffXd
 
 from diagrams import Scenario
 from diagrams.building.laws import make_controller
-from diagrams.scenario.own_code import loaded_digests
+from diagrams.scenario.own_versions import loaded_digests
 from systems.framework.input_error import InputError
 
 #: Step between the distances of ``forces_n``, m. For the default laws, linear
@@ -141,7 +141,7 @@ def radial_law(scenario: Scenario) -> RadialLaw:
     return _radial_law(
         key.only.law,
         str(loaded_digests(key)),
-        key.follower.laws.model_dump_json(),
+        f"{key.follower.laws.model_dump_json()} {key.only.own_gains}",
         (sensor.minimum_range_m, sensor.maximum_range_m),
         key.only.robot.top_speed_m_s,
         _Scenario(key),

@@ -200,7 +200,8 @@ def figure_svg(figure: Drawing, name: str, label: str) -> Markup:
             metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
         )
     width, height = figure.get_size_inches()
-    return _embed(stream.getvalue(), name, label, tall=bool(height > width))
+    shape = "tall" if height > width else "square" if height > 0.9 * width else ""
+    return _embed(stream.getvalue(), name, label, shape)
 
 
 def formula_svg(tex: str, name: str, label: str) -> Markup:
@@ -216,10 +217,11 @@ def formula_svg(tex: str, name: str, label: str) -> Markup:
     return _embed(stream.getvalue().decode(), name, label)
 
 
-def _embed(svg: str, name: str, label: str, *, tall: bool = False) -> Markup:
+def _embed(svg: str, name: str, label: str, shape: str = "") -> Markup:
     """Turns the text of an SVG file into an element of an HTML page.
 
-    On paper, a tall drawing may fill the page.
+    On paper, a drawing of the shape ``tall`` may fill the page, and two drawings of the
+    shape ``square`` are side by side.
 
     Identifiers must be unique on the page. If another part of the SVG refers to an
     identifier, the function puts the drawing's name in front of the identifier. The
@@ -237,6 +239,6 @@ def _embed(svg: str, name: str, label: str, *, tall: bool = False) -> Markup:
     svg = re.sub(r'(href=")#', rf"\1#{name}-", svg)
     svg = svg.replace("url(#", f"url(#{name}-")
     label = escaping.escape(label.replace("`", ""))
-    kind = ' class="tall"' if tall else ""
+    kind = f' class="{shape}"' if shape else ""
     start = f'<svg{kind} role="img" aria-label="{label}" '
     return Markup(svg.replace("<svg ", start, 1))

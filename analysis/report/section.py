@@ -165,6 +165,8 @@ class Picture:
 
     file: str
     caption: str
+    tall: bool = False
+    """Whether the picture may fill a page of paper."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 from diagrams import RunResult
 from diagrams.scenario.bodies import robot_rectangle
 from systems.framework.input_error import InputError
-from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners
+from systems.world.geometry import (
+    nearest_point_on_rectangle,
+    rectangle_clearance,
+    rectangle_corners,
+)
 
 
 def contact_point(result: RunResult) -> NDArray[np.float64]:
@@ -21,10 +25,11 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
     hit, scenario = result.collision, result.scenario
     if hit is None:
         raise InputError("contact_point", f"the run ended by {result.cause!r}")
-    body = result.surroundings.bodies[hit.object].rectangle(hit.time)
+    body = result.surroundings.bodies[hit.object].rectangles(hit.time)
     pose = result.poses("WB")[np.argmin(np.abs(result.time - hit.time))]
     footprint = robot_rectangle(pose, scenario.only.robot)
-    return touching_point(footprint, body)
+    nearest = min(body, key=lambda row: rectangle_clearance(footprint, row))
+    return touching_point(footprint, nearest)
 
 
 def touching_point(
@@ -32,15 +37,18 @@ def touching_point(
 ) -> NDArray[np.float64]:
     """Returns the (2,) point at which two rectangles touch, m.
 
-    Both rectangles are (x, y, theta, length, width), m and rad, in the frame of the
-    result. The point is the mean of all corners of either rectangle that lie inside the
-    other rectangle. If there is no such corner, the point is the mean of the corners
-    that are nearest to the other rectangle.
+    Both rectangles are (x, y, theta, length, width, radius), m and rad, in the frame of
+    the result. The first has no radius. The point is the mean of all corners of either
+    rectangle that lie inside the other rectangle. If there is no such corner, the point
+    is the mean of the corners that are nearest to the other rectangle. For a round
+    corner, the point of the first rectangle that is nearest to its center counts.
     """
-    corners = np.concatenate([rectangle_corners(a), rectangle_corners(b)])
-    others = [b] * 4 + [a] * 4
-    away = [
-        math.hypot(*nearest_point_on_rectangle(corner, other))
-        for corner, other in zip(corners, others, strict=True)
-    ]
-    return np.mean(corners[np.array(away) <= min(away) + 1e-9], axis=0)
+    own, other = rectangle_corners(a), rectangle_corners(b)
+    into = [nearest_point_on_rectangle(corner, b) for corner in own]
+    back = [nearest_point_on_rectangle(corner, a) for corner in other]
+    away = np.array([math.hypot(*vector) for vector in [*into, *back]])
+    away[4:] = np.maximum(away[4:] - b[5], 0.0)
+    if b[5] > 0.0:
+        other = other + np.array(back)
+    points = np.concatenate([own, other])
+    return np.mean(points[away <= away.min() + 1e-9], axis=0)

@@ -16,7 +16,8 @@ from analysis.runs.shortest_path import shortest_path_length
 from analysis.runs.smoothness import jerk, windows
 from diagrams.running.stop_rules import REST_SPEED_M_S, ROUNDING_S
 from systems.framework.compiling import njit
-from systems.world.geometry import control_point_velocity, fan_ranges
+from systems.world.cones import fan_ranges
+from systems.world.geometry import control_point_velocity
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -157,7 +158,12 @@ class MeasuredRun(Proximity):
             robot.start.position_m,
             result.surroundings.followed.path.pose(0.0)[:2],
             result.goal_radius_m + robot.robot.control_point_m,
-            [body.rectangle(0.0) for body in bodies if not body.path.moves],
+            [
+                row
+                for body in bodies
+                if not body.path.moves
+                for row in body.rectangles(0.0)
+            ],
             robot.robot.width_m / 2.0,
         )
         return length if math.isfinite(length) else None
@@ -252,9 +258,9 @@ class MeasuredRun(Proximity):
         """(n,) whether any sensor had an echo of the body with this name."""
         scenario = self.result.scenario
         sensors = scenario.sensing.ultrasonic
-        bodies = self.result.surroundings.bodies[name].rectangles(self.time)
+        body = self.result.surroundings.bodies[name].rectangles_over(self.time)
         offset = scenario.only.robot.control_point_m
-        ranges = _cone_ranges(self.result.poses("WB"), bodies, *sensors.beams, offset)
+        ranges = _cone_ranges(self.result.poses("WB"), body, *sensors.beams, offset)
         numbers = range(1, sensors.count + 1)
         read = np.stack([self.columns[f"range_{k}"] for k in numbers], axis=1)
         echo = np.stack([self.columns[f"echo_{k}"] for k in numbers], axis=1) > 0.5
@@ -322,17 +328,17 @@ class MeasuredRun(Proximity):
 @njit(cache=True)
 def _cone_ranges(
     poses: Floats,
-    bodies: Floats,
+    body: Floats,
     axes: Floats,
     places: Floats,
     half_angles: Floats,
     control_point_m: float,
 ) -> Floats:  # pragma: no cover  (compiled)
-    """(n, sensors) true ranges to one moving rectangle, m; see ``fan_ranges``."""
+    """(n, sensors) true ranges to a body (m, n, 6) over time, m; see ``fan_ranges``."""
     ranges = np.empty((len(poses), axes.size))
     for i in range(len(poses)):
         ranges[i] = fan_ranges(
-            poses[i], bodies[i : i + 1], axes, places, half_angles, control_point_m
+            poses[i], body[:, i], axes, places, half_angles, control_point_m
         )
     return ranges
 

@@ -270,7 +270,7 @@ def _first_reaction(
 
     - The repulsive force ``push`` (2, n) is at least ``REACTION_N``.
     - The nearest obstacle is nearer to the control point P than the target is. The
-      target is the last of the m ``bodies`` (m, n, 5).
+      target is the last of the m rectangles of ``bodies`` (m, n, 6).
     - A collision vector agrees with this obstacle: its length differs from the distance
       of the obstacle by at most ``ECHO_M``.
 

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.running.run_result import RunResult
-from diagrams.scenario.bodies import rectangles_at
 from systems.framework.compiling import njit
-from systems.world.geometry import contact_time, rectangle_clearance
+from systems.world.contacts import contact_time
+from systems.world.geometry import rectangle_clearance
+from systems.world.shapes import box
 
 Floats = NDArray[np.float64]
 
@@ -34,21 +35,21 @@ class Proximity:
 
     @cached_property
     def robot(self) -> Floats:
-        """(n, 5) rectangles (x, y, theta, length, width) of the robot at the ticks."""
-        return rectangles_at(self.result.poses("WB"), self.result.scenario.only.size)
+        """(n, 6) rectangles of the robot at the ticks, see ``systems.world.plane``."""
+        shape = box(self.result.scenario.only.size)
+        return shape.at(self.result.poses("WB"))[0]
 
     @cached_property
     def bodies(self) -> Floats:
-        """(m, n, 5) rectangles of m bodies at n ticks.
+        """(m, n, 6) rectangles of all bodies at n ticks.
 
         The target of the robot comes last. A target without a body is not included.
         """
         around, time = self.result.surroundings, self.result.time
-        bodies = [body.rectangles(time) for body in around.obstacles.values()]
+        bodies = [body.rectangles_over(time) for body in around.obstacles.values()]
         if around.goal is None:
-            size = around.followed.size
-            bodies.append(rectangles_at(self.result.poses("WS"), size))
-        return np.reshape(bodies, (-1, len(time), 5))
+            bodies.append(around.followed.shape.at(self.result.poses("WS")))
+        return np.concatenate([np.empty((0, len(time), 6)), *bodies])
 
     @property
     def clearance(self) -> Floats:
@@ -57,8 +58,9 @@ class Proximity:
 
     @cached_property
     def least(self) -> Floats:
-        """(m,) least clearance from each body, including the time between ticks, m.
+        """(k,) least clearance from each body, including the time between ticks, m.
 
+        The order is that of ``bodies``, with one value for all rectangles of a body.
         A body can pass the robot between two ticks. Therefore the time between two
         ticks is divided into ten parts if one of two conditions holds:
 
@@ -70,6 +72,17 @@ class Proximity:
         At the additional times, the poses of robots are interpolated. The other bodies
         have the exact poses of their paths.
         """
+        least = self._least
+        counts = [
+            len(body.shape.rectangles)
+            for body in self.result.surroundings.bodies.values()
+        ]
+        ends = np.cumsum(counts, dtype=int)
+        return np.array([part.min() for part in np.split(least, ends)[:-1]])
+
+    @cached_property
+    def _least(self) -> Floats:
+        """(m,) least clearance from each rectangle of ``bodies``, m; see ``least``."""
         clearance, least = self._clearances
         gone = np.hypot(*np.diff(self.robot[:, :2], axis=0).T)
         if len(self.bodies):
@@ -84,11 +97,10 @@ class Proximity:
         times = (time[ticks, None] + part * np.diff(time)[ticks, None]).ravel()
         step = np.diff(poses, axis=0)[ticks]
         between = poses[ticks, None] + part[:, None] * step[:, None]
-        robot = rectangles_at(between.reshape(-1, 3), self.result.scenario.only.size)
+        robot = box(self.result.scenario.only.size).at(between.reshape(-1, 3))[0]
         paths = self.result.surroundings.bodies.values()
-        bodies = np.reshape(
-            [body.rectangles(times) for body in paths], (-1, len(times), 5)
-        )
+        rows = [body.rectangles_over(times) for body in paths]
+        bodies = np.concatenate([np.empty((0, len(times), 6)), *rows])
         return np.minimum(least, least_clearances(robot, bodies)[1])
 
     @cached_property
@@ -115,13 +127,13 @@ def least_clearances(
 ) -> tuple[Floats, Floats]:  # pragma: no cover  (compiled)
     """Computes the least clearances between a moving rectangle and other rectangles.
 
-    The robot (n, 5) and the m bodies (m, n, 5) are rectangles (x, y, theta, length,
-    width) at n times, m and rad. The function returns the (n,) clearance from the
-    nearest body at each time and the (m,) least clearance from each body over all
-    times, m. If rectangles overlap, the clearance is negative.
+    The robot (n, 6) and the m other rectangles (m, n, 6) are (x, y, theta, length,
+    width, radius) at n times, m and rad. The function returns the (n,) clearance from
+    the nearest rectangle at each time and the (m,) least clearance from each rectangle
+    over all times, m. If rectangles overlap, the clearance is negative.
 
-    To save time, the function skips a body at times at which the enclosing circles of
-    both rectangles are far apart.
+    To save time, the function skips a rectangle at times at which the enclosing circles
+    of both rectangles are far apart.
     """
     count, ticks = bodies.shape[:2]
     nearest, least = np.full(ticks, np.inf), np.full(count, np.inf)
@@ -176,7 +188,7 @@ def _reaches(robot: Floats, bodies: Floats) -> Floats:  # pragma: no cover  (com
     reaches = np.empty(len(bodies))
     for k in range(len(bodies)):
         a, b = robot[0], bodies[k, 0]
-        reaches[k] = 0.5 * (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4]))
+        reaches[k] = 0.5 * (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4])) + b[5]
     return reaches
 
 

@@ -29,8 +29,9 @@ def shortest_path_length(
 ) -> float:
     """Computes the length of the shortest path of a disc to a circle around the goal.
 
-    Lengths are in m. The boxes (n, 5) are rectangles (x, y, theta, length, width) at
-    rest, m and rad. The path is that of the center of the disc, and ends on the circle.
+    Lengths are in m. The boxes (n, 6) are rectangles (x, y, theta, length, width,
+    radius) at rest, m and rad. The path is that of the center of the disc, and ends on
+    the circle.
 
     The function grows the boxes by the radius of the disc. Polygons just outside of the
     grown boxes replace their rounded corners. The function then runs A* on the
@@ -42,7 +43,7 @@ def shortest_path_length(
     path.
     """
     ends = np.asarray([start, goal], dtype=float)
-    rectangles = np.asarray(boxes, dtype=float).reshape(-1, 5)
+    rectangles = np.asarray(boxes, dtype=float).reshape(-1, 6)
     return _search(ends[0], ends[1], float(goal_radius), rectangles, float(radius))
 
 
@@ -103,7 +104,7 @@ def _outline(
 ) -> None:  # pragma: no cover  (compiled)
     """Computes the corners of a polygon just outside of a box that grew by a radius."""
     step = 0.5 * math.pi / TANGENTS
-    arc = radius / math.cos(0.5 * step)
+    arc = (radius + box[5]) / math.cos(0.5 * step)
     c, s = math.cos(box[2]), math.sin(box[2])
     for k in range(4 * TANGENTS):
         angle = (k + 0.5) * step

@@ -348,7 +348,8 @@ def outside(boxes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
         while True:
             stretch = 1.0 + 0.002 * step / far
             box = x * stretch, y * stretch, *rest
-            if math.hypot(*beyond_rectangle((0.0, 0.0), box)) >= START_BUBBLE_M + 1e-4:
+            away = math.hypot(*beyond_rectangle((0.0, 0.0), (*box, 0.0)))
+            if away >= START_BUBBLE_M + 1e-4:
                 break
             step += 1
         moved.append(box)
@@ -472,7 +473,7 @@ def least_clearances(result: RunResult) -> tuple[float, float]:
     """
     robot = result.scenario.only.robot
     others = result.surroundings.bodies.values()
-    boxes = np.array([body.rectangle(0.0) for body in others])
+    boxes = np.concatenate([body.rectangles(0.0) for body in others])
     size = np.array([robot.length_m, robot.width_m])
     poses = np.ascontiguousarray(result.poses("WB"))
     body, disc = _least(poses, boxes, size)
@@ -483,10 +484,10 @@ def least_clearances(result: RunResult) -> tuple[float, float]:
 def _least(
     poses: Any, boxes: Any, size: Any
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    mine, body, disc = np.empty(5), np.inf, np.inf
-    mine[3:] = size
+    mine, body, disc = np.zeros(6), np.inf, np.inf
+    mine[3:5] = size
     for box in boxes:
-        reach = 0.5 * math.hypot(box[3], box[4]) + 1.0
+        reach = 0.5 * math.hypot(box[3], box[4]) + box[5] + 1.0
         for k in range(len(poses)):
             if math.hypot(poses[k, 0] - box[0], poses[k, 1] - box[1]) > reach:
                 continue
@@ -499,5 +500,5 @@ def _least(
                 dx, dy = mine[0] - box[0], mine[1] - box[1]
                 u = max(abs(c * dx + s * dy) - 0.5 * box[3], 0.0)
                 v = max(abs(c * dy - s * dx) - 0.5 * box[4], 0.0)
-                disc = min(disc, math.hypot(u, v))
+                disc = min(disc, math.hypot(u, v) - box[5])
     return body, disc

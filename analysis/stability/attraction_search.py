@@ -205,7 +205,7 @@ class RecommendedGains:
         name = self.scenario.name
         words = [
             "phonotaxis simulate",
-            name if name in library_scenarios() else "scenario.yaml",
+            name if name in library_scenarios() else f"{name}.yaml",
             f"--law {self.scenario.only.law}",
             *(f"--set {field}={value:g}" for field, value in self.settings.items()),
         ]

@@ -9,7 +9,7 @@ scenario, its section states the reason. The other parts still run.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -152,6 +152,7 @@ def analyze_law(
     raised, because the other parts depend on the first part.
     """
     analysis = LawAnalysis(scenario, model_sheet(scenario))
+    analysis.notes.extend(_bodies_held_at_rest(scenario))
     study = Study(scenario, full, analysis.found)
     for part in parts:
         step(part.title)
@@ -159,6 +160,21 @@ def analyze_law(
         analysis.sections.append(_run(part, study, analysis))
         analysis.computing_time_s[part.key] = round(time.perf_counter() - start, 3)
     return analysis
+
+
+def _bodies_held_at_rest(scenario: Scenario) -> Iterator[str]:
+    """Yields a note about the bodies that move in the scenario, if there are any."""
+    moving = [each for each in scenario.obstacles if each.path().moves]
+    if moving:
+        places = [
+            f"{each.name} at ({each.waypoints_m[0][0]:g}, {each.waypoints_m[0][1]:g}) m"
+            for each in moving
+        ]
+        yield (
+            f"{', '.join(each.name for each in moving)} can move; this whole report is "
+            f"about bodies at rest where they start: {', '.join(places)}. A run can "
+            "end in a collision that no number here excludes."
+        )
 
 
 def _run(part: Part[Any], study: Study, analysis: LawAnalysis) -> Section:

@@ -377,8 +377,7 @@ def _show_heading(data: HeadingLoopMargins) -> list[Content]:
             "held over a tick. The loop is cut at the deviation of the heading. It is "
             "linear for deviations within L and within all limits; with a larger "
             "deviation the robot turns on the spot, more slowly than the linear loop "
-            "would. Linear models do not cover steps, phases and finds: "
-            "docs/searches.md states how often each occurs."
+            "would. Linear models do not cover steps, phases and finds."
         ),
         Table.of(
             [data],

@@ -35,6 +35,7 @@ from analysis.report.section import (
 from analysis.stability.law_analysis import LawAnalysis
 from analysis.stability.model_sheet import ModelSheet, ParameterRow
 from diagrams import write_scenario
+from diagrams.scenario.own_sources import write_own_sources
 from systems.laws.catalog import law_title
 from systems.laws.law import Equation
 
@@ -102,7 +103,7 @@ def write_stability(
 
     - ``report.html`` is the report.
     - ``summary.json`` is the JSON document from ``stability_document``.
-    - ``scenario.yaml`` is the scenario.
+    - ``scenario.yaml`` is the scenario, and ``own_code`` has the user's own laws.
     - ``models.mat`` and ``models/*.csv`` are the linear models.
     """
     models = [
@@ -113,6 +114,8 @@ def write_stability(
     write_models(models, directory)
     scenario = analyses[0].scenario
     write_scenario(scenario, directory)
+    own = [name for each in analyses for name in each.scenario.only.own_code]
+    write_own_sources(own, directory)
     (directory / "summary.json").write_text(json.dumps(document) + "\n")
     (directory / "report.html").write_text(stability_page(analyses), "utf-8")
 

@@ -36,7 +36,7 @@ def _show(data: Guarantees) -> list[Content]:
                 "": lambda each: "holds" if each.holds else "broken",
             },
         ),
-        "See docs/guard.md for theorems, assumptions and their tests.",
+        "The page `Guard` of the documentation has theorems and their assumptions.",
     ]
 
 

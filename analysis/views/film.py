@@ -14,14 +14,15 @@ from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
 from numpy.typing import NDArray
 
 from analysis.report.palette import COLORS, draw_grid
+from analysis.report.shape_patch import shape_patch
 from analysis.views.framing import run_title, tick_at
 from analysis.views.picture import map_axes
 from analysis.views.scene import (
-    Box,
     Cone,
     Contact,
     Estimate,
     Goal,
+    Obstacle,
     Plume,
     Rings,
     RobotBody,
@@ -34,7 +35,7 @@ from analysis.views.scene import (
 )
 from diagrams import RunResult
 from diagrams.scenario.bodies import microphones_W
-from systems.world.geometry import rectangle_corners
+from systems.world.shapes import Shape, box
 
 #: Resolution of the frames, dots per inch. The frames are 8 inches wide.
 DPI = 90
@@ -44,12 +45,12 @@ DPI = 90
 RING_S, RING_M_S, RING_M = 0.15, 3.0, 1.5
 #: Kinds of shapes in the order of drawing.
 _ORDER = (
-    *(Walls, Plume, Goal, Box, Trail, SourceBody, Rings),
+    *(Walls, Plume, Goal, Obstacle, Trail, SourceBody, Rings),
     *(Cone, RobotBody, Estimate, Touched, Contact),
 )
 
 #: Kinds of shapes in the legend.
-_NAMED = RobotBody, SourceBody, Box, Estimate, Plume
+_NAMED = RobotBody, SourceBody, Obstacle, Estimate, Plume
 #: Styles of the shapes that are drawn as a marker at their position.
 _MARKS: dict[type, dict[str, Any]] = {
     Plume: {"marker": "*", "ms": 11},
@@ -85,7 +86,7 @@ class RunFrames:
             (thing for thing in scene.things if isinstance(thing.shape, _ORDER)),
             key=lambda thing: _ORDER.index(type(thing.shape)),
         )
-        fixed = Walls, Plume, Goal, Box
+        fixed = Walls, Plume, Goal, Obstacle
         self._moving = [
             each for each in things if each.moves or not isinstance(each.shape, fixed)
         ]
@@ -132,22 +133,21 @@ class RunFrames:
         pose = thing.pose(tick)
         x, y, theta = pose
 
-        def body(length: float, width: float, alpha: float | None = None) -> Artist:
-            corners = rectangle_corners(np.array([*pose, length, width]))
-            return add(Polygon(corners, color=color, alpha=alpha))
+        def body(shape: Shape, alpha: float | None = None) -> Artist:
+            return add(shape_patch(shape, pose, color=color, alpha=alpha))
 
         found: list[Any] = []
         match thing.shape:
             case Walls(corner, (wide, deep, _)):
                 walls = Rectangle(corner, wide, deep, fill=False, ec=color, lw=4.0)
                 found = [add(walls)]
-            case Box(length, width) | Touched(length, width):
-                found = [body(length, width)]
+            case Obstacle(shape) | Touched(shape):
+                found = [body(shape)]
             case Trail(line):
                 way = thing.poses[: tick + 1, :2].T
                 found = plot(*way, line, color=color, lw=1.6 if line == "-" else 1.0)
             case SourceBody(length, width, is_body=True):
-                found = [body(length, width, 0.6)]
+                found = [body(box((length, width)), 0.6)]
             case SourceBody():
                 found = plot(x, y, "D", color=color, ms=6)
             case Rings(bursts):
@@ -158,7 +158,7 @@ class RunFrames:
                 ends = axis - half, axis + half
                 found = [add(Wedge((x, y), reach[tick], *ends, fc=(*tint, 0.2)))]
             case RobotBody(own, hears):
-                found = [body(own.length_m, own.width_m, 0.55)]
+                found = [body(box((own.length_m, own.width_m)), 0.55)]
                 if hears:
                     bar = microphones_W(pose, own).T
                     found += plot(*bar, "-o", color=color, ms=3.2, lw=2.0)

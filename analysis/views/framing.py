@@ -8,9 +8,11 @@ import textwrap
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams import RunResult
+from diagrams import RunResult, Scenario
 from diagrams.running.stop_rules import SUCCESSFUL
 from diagrams.scenario.bodies import Path
+from diagrams.scenario.participants import Router
+from systems.world.plane import rectangle_corners
 
 #: Possible intervals between the times that a picture shows, s. They are round numbers.
 _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
@@ -55,20 +57,56 @@ def picture_title(result: RunResult) -> str:
 def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
     """Returns a rectangle that contains the centers of all bodies during the whole run.
 
-    The rectangle has the least x, greatest x, least y and greatest y in the world frame
-    W, m. It extends beyond all centers by ``margin``, m. It includes the walls of the
-    room, if there is a room. It ignores estimated positions, because a large error
-    would enlarge the picture too much.
+    Of walls and polygons, it contains all corners. The rectangle has the least x,
+    greatest x, least y and greatest y in the world frame W, m. It extends beyond all
+    centers by ``margin``, m. It includes the walls of the room, if there is a room. It
+    ignores estimated positions, because a large error would enlarge the picture too
+    much.
     """
-    scenario, times = result.full_scenario, picture_times(result, most=60)
     centers = [
         own.poses(body)[:, :2]
         for own in result.robots.values()
         for body in ("WB", "WS")
     ]
+    times = picture_times(result, most=60)
+    return _bounds(result.full_scenario, centers, times, margin)
+
+
+def expected_bounds(
+    scenario: Scenario, margin: float
+) -> tuple[float, float, float, float]:
+    """Returns a rectangle that contains all bodies of a run before it starts.
+
+    The format is that of ``bounds``. Robots count with their starts and goals, and
+    sources and obstacles with their whole paths.
+    """
+    robots = scenario.robots
+    centers = [np.array([each.start.pose[:2]]) for each in robots.values()]
+    centers += [
+        np.array([each.route.goal_m])
+        for each in robots.values()
+        if isinstance(each, Router)
+    ]
+    times = np.linspace(0.0, scenario.duration_s, 240)
+    return _bounds(scenario, centers, times, margin)
+
+
+def _bounds(
+    scenario: Scenario,
+    centers: list[NDArray[np.float64]],
+    times: NDArray[np.float64],
+    margin: float,
+) -> tuple[float, float, float, float]:
+    """Returns a rectangle around points and around the paths of other bodies."""
     paths: list[Path] = [each.path() for each in scenario.sources.values()]
-    paths += [obstacle.path() for obstacle in scenario.obstacles]
     centers += [path.poses(times)[:, :2] for path in paths]
+    for each in scenario.obstacles:
+        poses, shape = each.path().poses(times), each.shape()
+        if shape.centered:
+            centers.append(poses[:, :2])
+        else:
+            rows = shape.at(poses).reshape(-1, 6)
+            centers += [rectangle_corners(row) for row in rows]
     points = np.concatenate(centers)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     if scenario.room is not None:
@@ -92,8 +130,18 @@ def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
     The format is that of ``bounds``. The floor contains the whole run. It is at least
     as large as the arena of the scenario.
     """
-    x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
-    width, depth = result.full_scenario.arena_m
+    return whole_meters(bounds(result, margin=0.8), result.full_scenario.arena_m)
+
+
+def whole_meters(
+    edges: tuple[float, float, float, float], arena_m: tuple[float, float]
+) -> tuple[float, float, float, float]:
+    """Returns a rectangle in whole meters that contains another one, see ``bounds``.
+
+    It is at least as large as an arena with the given width and depth, m.
+    """
+    x_low, x_high, y_low, y_high = edges
+    width, depth = arena_m
     x_more = max(width - (x_high - x_low), 0.0) / 2.0
     y_more = max(depth - (y_high - y_low), 0.0) / 2.0
     return (

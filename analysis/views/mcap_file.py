@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from analysis.report.palette import COLORS
 from analysis.runs.recorded_run import SCENARIO_FILE, RecordedRun
+from analysis.views.meshes import prism
 from analysis.views.scene import (
     BODY_HEIGHT_M,
     ROBOT_HEIGHT_M,
-    Box,
+    Obstacle,
     RobotBody,
     SourceBody,
     Thing,
@@ -31,13 +32,14 @@ from diagrams.scenario.participants import HasRangeSensors, Robot
 from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import InputError
 from systems.sound.parameters import RoomParameters
+from systems.world.shapes import Shape
 
 #: A message, as its fields by name.
 Message = dict[str, Any]
 #: Name of the world frame W.
 WORLD_FRAME = "world"
 #: Constants of ``visualization_msgs/Marker``.
-_CUBE, _LINE_LIST, _ADD = 1, 5, 0
+_CUBE, _CYLINDER, _LINE_LIST, _TRIANGLES, _ADD = 1, 3, 5, 11, 0
 #: Width of the edges of a room, m.
 _EDGE_M = 0.03
 _PACKAGES = ("mcap", "mcap_ros2", "rosbags")
@@ -258,8 +260,8 @@ def _body_markers(
             case SourceBody(length, width, is_body=True):
                 size = length, width, BODY_HEIGHT_M
                 markers.append(_box(frame, "sources", size, "source"))
-            case Box() as size:
-                markers.append(_box(frame, "obstacles", size, "obstacle"))
+            case Obstacle(shape, height):
+                markers.append(_solid(frame, shape, height))
     if room is not None:
         markers.append(_edges(room))
     return [{**marker, "id": number} for number, marker in enumerate(markers)]
@@ -270,6 +272,23 @@ def _box(
 ) -> Message:
     at = _pose((0.0, 0.0, 0.0), 0.5 * size[2])
     return _marker(frame, group, _CUBE, color, at, _vector(*size))
+
+
+def _solid(frame: str, shape: Shape, height: float) -> Message:
+    """Returns a ``Marker`` message of an obstacle with a height, m."""
+    if shape.centered:
+        length, width, radius = shape.rectangles[0, 3:].tolist()
+        if radius == 0.0:
+            return _box(frame, "obstacles", (length, width, height), "obstacle")
+        if length == width == 0.0:
+            at, size = _pose((0.0, 0.0, 0.0), 0.5 * height), 2.0 * radius
+            scale = _vector(size, size, height)
+            return _marker(frame, "obstacles", _CYLINDER, "obstacle", at, scale)
+    meshes = [prism(outline, height) for outline in shape.outlines]
+    corners = [mesh.vertices[:, mesh.faces.T.ravel()].T for mesh in meshes]
+    points = [_vector(*point) for point in np.concatenate(corners).tolist()]
+    at, scale = _pose((0.0, 0.0, 0.0)), _vector(1.0, 1.0, 1.0)
+    return _marker(frame, "obstacles", _TRIANGLES, "obstacle", at, scale, points=points)
 
 
 def _edges(room: RoomParameters) -> Message:

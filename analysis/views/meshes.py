@@ -1,4 +1,4 @@
-"""Makes flat meshes of triangles for a replay: bands, rectangles, arrows and stars."""
+"""Makes meshes of triangles for a replay: bands, arrows, stars and prisms."""
 
 from __future__ import annotations
 
@@ -74,6 +74,55 @@ def arrow() -> Mesh:
     y = [-shaft, -shaft, shaft, shaft, -head, 0.0, head]
     faces = np.array([[0, 0, 4], [1, 2, 5], [2, 3, 6]], dtype=np.int32)
     return Mesh(_at_height(np.vstack([x, y]), 0.0), faces)
+
+
+def prism(outline: NDArray[np.float64], height: float) -> Mesh:
+    """Makes an upright prism on the floor, without its bottom.
+
+    ``outline`` has the (n, 2) corners of a polygon whose edges do not cross, m.
+    ``height`` is in m.
+    """
+    x, y = outline.T
+    if x @ np.roll(y, -1) < y @ np.roll(x, -1):  # clockwise
+        outline = outline[::-1]
+    count = len(outline)
+    first = np.arange(count)
+    after = np.roll(first, -1)
+    sides = [[first, after, count + after], [first, count + after, count + first]]
+    top = count + _triangles(outline).T
+    faces = np.hstack([*map(np.array, sides), top]).astype(np.int32)
+    points = [_at_height(outline.T, z) for z in (0.0, height)]
+    return Mesh(np.hstack(points), faces)
+
+
+def _triangles(outline: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Cuts a counterclockwise polygon into triangles, (n - 2, 3) indices of corners.
+
+    The function cuts off ears: a corner is an ear if it is convex, and the triangle
+    with its neighbors contains no other corner (Meisters, 1975).
+    """
+    left, found, k = list(range(len(outline))), [], 0
+    tries = 0
+    while len(left) > 3:
+        i = k % len(left)
+        ear = left[i - 1], left[i], left[(i + 1) % len(left)]
+        others = [j for j in left if j not in ear]
+        tries += 1
+        # Rounding may hide all ears of a thin polygon. Then any corner will do.
+        if _is_ear(outline[list(ear)], outline[others]) or tries > len(left):
+            found.append(ear)
+            del left[i]
+            tries = 0
+        else:
+            k += 1
+    return np.array([*found, left])
+
+
+def _is_ear(corners: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    u, v = np.roll(corners, -1, axis=0) - corners, others[:, None] - corners
+    convex = u[0, 0] * u[1, 1] - u[0, 1] * u[1, 0] > 0.0
+    inside = u[:, 0] * v[..., 1] - u[:, 1] * v[..., 0] >= 0.0
+    return bool(convex and not inside.all(axis=1).any())
 
 
 def _at_height(points: NDArray[np.float64], z: float) -> NDArray[np.float64]:

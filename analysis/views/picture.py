@@ -13,23 +13,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon, Rectangle, Wedge
+from matplotlib.patches import Rectangle, Wedge
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from analysis.report.body_labels import BodyLabel, spread_labels
 from analysis.report.notebook_figure import NotebookFigure
 from analysis.report.palette import COLORS, draw_grid, faintest
+from analysis.report.shape_patch import label_rectangle, shape_patch
 from analysis.runs.known_space import known_space
 from analysis.views.framing import bounds, picture_times, picture_title, tick_at
 from analysis.views.plume_history import concentration_map, plume_history
 from analysis.views.scene import (
-    Box,
     Cone,
     Contact,
     Estimate,
     Goal,
     KnownFloor,
+    Obstacle,
     Plume,
     RobotBody,
     Scene,
@@ -42,7 +43,7 @@ from analysis.views.scene import (
 )
 from diagrams import RunResult
 from diagrams.scenario.bodies import microphones_W
-from systems.world.geometry import rectangle_corners
+from systems.world.shapes import Shape, box
 
 #: Width of the pictures, inch.
 WIDTH_IN = 8.0
@@ -81,13 +82,19 @@ def plot_trajectory(result: RunResult) -> Figure:
     return figure
 
 
-def map_axes(result: RunResult) -> tuple[Figure, Axes]:
+def map_axes(*results: RunResult, below_in: float = BELOW_IN) -> tuple[Figure, Axes]:
     """Makes a figure with axes in W, m, that show all bodies, and space for a legend.
+
+    The height of the space below the axes is ``below_in``, inch.
 
     The axes have equal scales. The height of the axes is 0.4 to 1.3 times their width;
     if necessary, they show more of the floor than the bodies need.
     """
-    x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
+    limits = np.array([bounds(result, margin=0.7) for result in results])
+    (x_low, y_low), (x_high, y_high) = (
+        limits[:, [0, 2]].min(axis=0).tolist(),
+        limits[:, [1, 3]].max(axis=0).tolist(),
+    )
     width = WIDTH_IN - LEFT_IN - RIGHT_IN
     tallest, flattest = 1.3 * width, 0.4 * width
     more = max((y_high - y_low) * width / tallest - (x_high - x_low), 0.0) / 2.0
@@ -95,10 +102,10 @@ def map_axes(result: RunResult) -> tuple[Figure, Axes]:
     more = max((x_high - x_low) * flattest / width - (y_high - y_low), 0.0) / 2.0
     y_low, y_high = y_low - more, y_high + more
     height = width * (y_high - y_low) / (x_high - x_low)
-    total = BELOW_IN + height + ABOVE_IN
+    total = below_in + height + ABOVE_IN
     figure = NotebookFigure(figsize=(WIDTH_IN, total))
     axes = figure.add_axes(
-        (LEFT_IN / WIDTH_IN, BELOW_IN / total, width / WIDTH_IN, height / total)
+        (LEFT_IN / WIDTH_IN, below_in / total, width / WIDTH_IN, height / total)
     )
     axes.set(aspect="equal", xlim=(x_low, x_high), ylim=(y_low, y_high))
     axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))
@@ -179,16 +186,16 @@ class _Painter:
         a, b = (thing.pose(tick_at(self.result, time)) for time in (first, second))
         return math.dist(a[:2], b[:2])
 
-    def body(self, rectangle: ArrayLike, **style: Any) -> None:
-        self.axes.add_patch(Polygon(rectangle_corners(rectangle), **style))
+    def body(self, shape: Shape, pose: ArrayLike, **style: Any) -> None:
+        self.axes.add_patch(shape_patch(shape, pose, **style))
 
-    def time(self, rectangle: ArrayLike, time: float, color: str) -> None:
+    def time(self, shape: Shape, pose: ArrayLike, time: float, color: str) -> None:
         """Writes the time at the right side of a body.
 
         ``spread_labels`` later moves labels that overlap.
         """
         text = f"{round(time, 1):g} s"
-        self.axes.add_artist(BodyLabel(text, np.asarray(rectangle), color))
+        self.axes.add_artist(BodyLabel(text, label_rectangle(shape, pose), color))
 
     def cones(self, thing: Thing, shape: Cone) -> None:
         """Draws the cone of a range sensor at several times.
@@ -261,19 +268,19 @@ class _Painter:
             )
         )
 
-    def box(self, thing: Thing, shape: Box) -> None:
-        """Draws an obstacle at rest as a filled box, and a moving one as outlines."""
-        label, color = self.once(thing.label), thing.color
-        size = shape.length, shape.width
+    def obstacle(self, thing: Thing, obstacle: Obstacle) -> None:
+        """Draws an obstacle at rest as a filled shape, and a moving one as outlines."""
+        label, color, shape = self.once(thing.label), thing.color, obstacle.shape
         gid = f"obstacle {thing.name}"
         if not thing.moves:
-            body = [*thing.pose(0), *size]
-            self.body(body, gid=gid, color=color, label=label, zorder=3.5)
+            style: dict[str, Any] = {"gid": gid, "color": color, "label": label}
+            self.body(shape, thing.pose(0), zorder=3.5, **style)
             return
         for time in self.apart(thing, picture_times(self.result), 0.5 * APART_M):
-            body = [*thing.pose(tick_at(self.result, time)), *size]
+            pose = thing.pose(tick_at(self.result, time))
             self.body(
-                body,
+                shape,
+                pose,
                 gid=f"{gid} at {time:g}",
                 fill=False,
                 edgecolor=color,
@@ -281,9 +288,9 @@ class _Painter:
                 label=label if time == 0.0 else None,
                 zorder=3.5,
             )
-            self.time(body, time, color)
+            self.time(shape, pose, time, color)
         if self.ends_only:
-            self.body([*thing.pose(len(thing.times) - 1), *size], color=color)
+            self.body(shape, thing.pose(len(thing.times) - 1), color=color)
 
     def plume(self, thing: Thing, shape: Plume) -> None:
         """Draws the odor source, and its plume at the end of the run."""
@@ -326,12 +333,13 @@ class _Painter:
             place, label = thing.poses[-1, :2], thing.label
             self.axes.plot(*place, "D", color=color, label=label, **style)
             return
-        size = shape.length, shape.width
+        body = box((shape.length, shape.width))
         ends = (0, len(thing.poses) - 1) if thing.moves else (0,)
         which = "first and last" if thing.moves else "at rest"
         for index in ends:
             self.body(
-                [*thing.poses[index], *size],
+                body,
+                thing.poses[index],
                 gid="source",
                 facecolor=(*to_rgb(color), 0.6 if index else 0.25),
                 edgecolor=color,
@@ -343,7 +351,7 @@ class _Painter:
             pose = thing.pose(tick_at(self.result, time))
             self.axes.plot(*pose[:2], "o", color=color, markersize=4, zorder=4)
             if thing.moves:
-                self.time([*pose, *size], time, color)
+                self.time(body, pose, time, color)
 
     def estimates(self, thing: Thing, shape: Estimate) -> None:
         """Draws a cross for each new estimate. Early estimates are faint."""
@@ -370,9 +378,10 @@ class _Painter:
         own, color = shape.parameters, thing.color
         for time in self.times_of(thing):
             pose = thing.pose(tick_at(self.result, time))
-            rectangle = [*pose, own.length_m, own.width_m]
+            body = box((own.length_m, own.width_m))
             self.body(
-                rectangle,
+                body,
+                pose,
                 gid=f"robot at {time:g}",
                 facecolor=(*to_rgb(color), 0.10),
                 edgecolor=color,
@@ -384,7 +393,7 @@ class _Painter:
                 bar: dict[str, Any] = {"ms": 3.2, "lw": 2.0, "zorder": 5}
                 microphones = microphones_W(pose, own).T
                 self.axes.plot(*microphones, "-o", color=color, **bar)
-            self.time(rectangle, time, color)
+            self.time(body, pose, time, color)
 
     def hit(self, thing: Thing, shape: Touched) -> None:
         """Draws the touched body where it was at the time of the collision."""
@@ -392,7 +401,8 @@ class _Painter:
             return
         tick = int(np.argmax(thing.seen))
         self.body(
-            [*thing.pose(tick), shape.length, shape.width],
+            shape.shape,
+            thing.pose(tick),
             gid="hit",
             facecolor=thing.color,
             edgecolor="white",
@@ -422,7 +432,7 @@ _DRAW: dict[type, Callable[[_Painter, Thing, Any], None]] = {
     Cone: _Painter.cones,
     KnownFloor: _Painter.known_floor,
     Walls: _Painter.walls,
-    Box: _Painter.box,
+    Obstacle: _Painter.obstacle,
     Plume: _Painter.plume,
     Trail: _Painter.trail,
     SourceBody: _Painter.source,

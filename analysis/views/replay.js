@@ -119,16 +119,18 @@
   $("#farther").addEventListener("click", () => zoom(1.25));
 
   // Names ------------------------------------------------------------------
-  const names = facts.names.map(([path, text]) => {
+  const names = facts.names.map(([path, text, ...place]) => {
     const label = make("span", { class: "name", style: "display: none" }, text);
     pane.append(label);
-    return { path, label };
+    return { path, label, place };
   });
   function placeNames() {
     if (!ready) return;
     viewer.scene.updateMatrixWorld();
-    for (const { path, label } of names) {
-      const p = where(path).add(screen(0, 0, 0.6)).project(viewer.camera);
+    for (const { path, label, place } of names) {
+      const p = new THREE.Vector3(...place, 0)
+        .applyMatrix4(node(path).object.matrixWorld)
+        .add(screen(0, 0, 0.6)).project(viewer.camera);
       const x = (p.x + 1) / 2 * pane.clientWidth, y = (1 - p.y) / 2 * pane.clientHeight;
       const inside = p.z < 1 && x > 0 && y > 12 && x < pane.clientWidth &&
         y < pane.clientHeight;

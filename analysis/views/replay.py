@@ -27,8 +27,8 @@ from analysis.report.palette import COLORS
 from analysis.runs.known_space import known_space
 from analysis.views.curves import page_charts
 from analysis.views.floor_layers import clipped, floor_layers
-from analysis.views.framing import floor_rectangle
-from analysis.views.meshes import Mesh, arrow, circle, rectangles, ribbon, star
+from analysis.views.framing import floor_rectangle, shown_rectangle
+from analysis.views.meshes import Mesh, arrow, circle, prism, rectangles, ribbon, star
 from analysis.views.overlays import Arrow, Ball, Bar, Circle, Disc, Frame, overlays
 from analysis.views.plume_history import plume_history
 from analysis.views.replay_page import replay_page
@@ -36,12 +36,12 @@ from analysis.views.replay_stage import add_floor, set_stage
 from analysis.views.scene import (
     BODY_HEIGHT_M,
     ROBOT_HEIGHT_M,
-    Box,
     Cone,
     Contact,
     Estimate,
     Goal,
     KnownFloor,
+    Obstacle,
     Plume,
     Rings,
     RobotBody,
@@ -59,6 +59,7 @@ from diagrams.scenario.bodies import RecordedPath
 from systems.base.robot import RobotParameters, microphones_B
 from systems.odor.odor_plume import PUFF_SIZE, PUFFS_BEGIN
 from systems.odor.parameters import CONTAINER_M
+from systems.world.shapes import rectangle_outline
 
 #: Largest number of frames per second that Meshcat records.
 FRAMES_PER_S = 32.0
@@ -101,9 +102,9 @@ def write_replay(
     """
     scene = make_scene(result)
     layers = [*scene.layers, *overlays(scene, frame_times(result))]
-    with _quiet_drake():
+    with quiet_drake():
         meshcat = Meshcat(MeshcatParams(host="localhost"))
-        add_floor(meshcat, result)
+        add_floor(meshcat, floor_rectangle(result), shown_rectangle(result))
         set_stage(meshcat)
         meshcat.StartRecording(FRAMES_PER_S, set_visualizations_while_recording=False)
         record(meshcat, scene, [thing for layer in layers for thing in layer.things])
@@ -125,12 +126,16 @@ def record(meshcat: Meshcat, scene: Scene, things: Iterable[Thing]) -> None:
         recorder.draw(thing)
 
 
-@contextmanager
-def _quiet_drake() -> Iterator[None]:
-    """Suppresses the message in which Drake prints the address of Meshcat's server.
+def draw_start(meshcat: Meshcat, things: Iterable[Thing]) -> None:
+    """Draws things with one time as they are at this time. Does not record them."""
+    recorder = _Recorder(meshcat, None)
+    for thing in things:
+        recorder.draw(thing)
 
-    No user needs this server, because the page is a file.
-    """
+
+@contextmanager
+def quiet_drake() -> Iterator[None]:
+    """Suppresses the message in which Drake prints the address of Meshcat's server."""
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.WARNING)
@@ -207,9 +212,16 @@ def _placed(
 class _Recorder:
     """Adds things to the scene of Meshcat, and records their motion."""
 
-    def __init__(self, meshcat: Meshcat, result: RunResult) -> None:
-        self.meshcat, self.result = meshcat, result
-        self.frames = frame_times(result)
+    def __init__(self, meshcat: Meshcat, result: RunResult | None) -> None:
+        self.meshcat, self._result = meshcat, result
+        self.end_s = result.simulated_s if result else 0.0
+        self.frames = frame_times(result) if result else np.zeros(1)
+
+    @property
+    def result(self) -> RunResult:
+        """The run. Shapes that show its past need it."""
+        assert self._result is not None
+        return self._result
 
     def draw(self, thing: Thing) -> None:
         self._add(thing)
@@ -312,11 +324,10 @@ class _Recorder:
                 self._robot(thing, shape)
             case SourceBody() as shape:
                 self._source(thing, shape)
-            case Box() | Touched() as size:
+            case Obstacle() | Touched() as shape:
                 # The touched body covers the body itself.
-                more = 0.01 if isinstance(size, Touched) else 0.0
-                box, middle = Block(*(each + more for each in size)), 0.5 * size.height
-                self.put(f"{path}/box", box, color, _placed(0.0, 0.0, middle))
+                more = 0.01 if isinstance(shape, Touched) else 0.0
+                self._solid(path, shape, more, color)
             case Walls() as shape:
                 self._walls(thing, shape)
             case Cone() as shape:
@@ -335,6 +346,27 @@ class _Recorder:
             case shape if type(shape) in _SINGLE:
                 single = _SINGLE[type(shape)](shape)
                 self.put(path, single, color, alpha=thing.alpha)
+
+    def _solid(
+        self, path: str, body: Obstacle | Touched, more: float, color: str
+    ) -> None:
+        """Adds a body that is larger than its shape by ``more``, m, in all extents."""
+        shape, middle = body.shape, _placed(0.0, 0.0, 0.5 * body.height)
+        height = body.height + more
+        if shape.centered:
+            length, width, radius = shape.rectangles[0, 3:].tolist()
+            if radius == 0.0:
+                box = Block(length + more, width + more, height)
+                self.put(f"{path}/box", box, color, middle)
+                return
+            if length == width == 0.0:
+                disc = Cylinder(radius + 0.5 * more, height)
+                self.put(f"{path}/disc", disc, color, middle)
+                return
+        grown = shape.rectangles + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * more])
+        outlines = [*shape.outlines, *map(rectangle_outline, grown if more else [])]
+        for number, outline in enumerate(outlines):
+            self.put(f"{path}/part_{number}", prism(outline, height), color)
 
     def _robot(self, thing: Thing, shape: RobotBody) -> None:
         """Adds a robot at the origin of its body frame B."""
@@ -419,7 +451,7 @@ class _Recorder:
     def _rings(self, thing: Thing, shape: Rings) -> None:
         robot = thing.parent and isinstance(thing.parent.shape, RobotBody)
         height = ROBOT_HEIGHT_M if robot else BODY_HEIGHT_M
-        times = np.arange(0.0, self.result.simulated_s, RING_S / 2.0)
+        times = np.arange(0.0, self.end_s, RING_S / 2.0)
         for number, radius in enumerate(RINGS_M):
             path = f"{thing.path}/{number + 1}"
             self.put(path, circle(radius, height, 0.03), thing.color)
@@ -478,7 +510,7 @@ class _Recorder:
         times: list[float] = []
         discs: list[list[tuple[float, float, float]]] = [[] for _ in range(_DISCS)]
         x, y, _ = thing.poses[0]
-        for instant in plume_history(shape.scenario, self.result.simulated_s):
+        for instant in plume_history(shape.scenario, self.end_s):
             if round(instant.time_s / _PUFFS_S * 1000) % 1000:
                 continue
             times.append(instant.time_s)

@@ -11,7 +11,7 @@ from typing import Any
 
 from analysis.report.render import COLORS_CSS
 from analysis.views.framing import run_title, shown_rectangle
-from analysis.views.scene import Layer, Scene
+from analysis.views.scene import Layer, Obstacle, Scene, Thing
 
 _HERE = Path(__file__).parent
 #: Beginning of the call in Meshcat's page that passes a message to the viewer.
@@ -35,7 +35,7 @@ def replay_page(
     data = {
         "end_s": result.simulated_s,
         "bounds_m": shown_rectangle(result),
-        "names": [(body.path, body.name) for body in scene.bodies.values()],
+        "names": [_name(body) for body in scene.bodies.values()],
         "charts": charts,
     }
     # Without the replacement, a text of the scenario that contains "</script>" would
@@ -79,6 +79,13 @@ def replay_page(
             end,
         ]
     )
+
+
+def _name(body: Thing) -> tuple[str, str, float, float]:
+    """Returns path and name of a body, and x and y of its label in its axes, m."""
+    solid = body.shape
+    x, y = solid.shape.middle if isinstance(solid, Obstacle) else (0.0, 0.0)
+    return body.path, body.name, x, y
 
 
 def _panels(

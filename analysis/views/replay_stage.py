@@ -1,4 +1,4 @@
-"""Adds the floor and the light to the 3D scene of a replay."""
+"""Adds the floor and the light to the 3D scene of a replay or of a live view."""
 
 from __future__ import annotations
 
@@ -10,21 +10,24 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.geometry import Box, Meshcat, Rgba
 from pydrake.math import RigidTransform
 
-from analysis.views.framing import floor_rectangle, shown_rectangle
-from diagrams import RunResult
+Rectangle = tuple[float, float, float, float]
 
 #: Size of the numbers on the floor, divided by the width of the floor that the replay
 #: shows first. With this size, the numbers are readable on a phone, too.
 NUMBER_SHARE = 0.028
 
 
-def add_floor(meshcat: Meshcat, result: RunResult) -> None:
+def add_floor(meshcat: Meshcat, floor: Rectangle, shown: Rectangle) -> None:
     """Adds a floor for the whole run, with one grid line per meter and labels of x.
 
-    The labels are at the edge of ``shown_rectangle`` that is nearest to the viewer. The
-    floor extends beyond this edge.
+    Args:
+        meshcat: Drake's 3D viewer.
+        floor: Edges of the floor in whole meters: least x, greatest x, least y and
+            greatest y, m.
+        shown: Edges of the part of the floor that the viewer shows first. The labels
+            are at its edge that is nearest to the viewer.
     """
-    x_low, x_high, y_low, y_high = floor_rectangle(result)
+    x_low, x_high, y_low, y_high = floor
     x, y = (x_low + x_high) / 2.0, (y_low + y_high) / 2.0
     slab = Box(x_high - x_low, y_high - y_low, 0.02)
     meshcat.SetObject("floor/slab", slab, Rgba(1.0, 1.0, 0.99))
@@ -35,7 +38,7 @@ def add_floor(meshcat: Meshcat, result: RunResult) -> None:
     starts = [(x, y_low) for x in along] + [(x_low, y) for y in across]
     ends = [(x, y_high) for x in along] + [(x_high, y) for y in across]
     _segments(meshcat, "floor/grid", starts, ends, Rgba(0.55, 0.55, 0.55))
-    left, right, near, _ = shown_rectangle(result)
+    left, right, near, _ = shown
     size = NUMBER_SHARE * (right - left)
     for x in along:
         text = f"{x:.0f} m".replace("-", "\u2212")

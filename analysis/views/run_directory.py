@@ -35,6 +35,7 @@ _FILES = {
     "replay.html": "the run in three dimensions, with curves over time",
     "trajectory.parquet": "one row per tick, SI units",
     "scenario.yaml": "all inputs of the run; `phonotaxis simulate` runs it again",
+    "own_code/SHA256SUMS": "sums of the copies of your own laws and blocks",
     "summary.json": "the numbers of this page, for programs",
 }
 
@@ -110,7 +111,7 @@ def _page(
         ("Blocks", "diagram{}.svg", "Blocks and their connections", {"": "", **whose}),
     ):
         shown = [
-            Picture(file.format(ending), f"{text}{who}.")
+            Picture(file.format(ending), f"{text}{who}.", tall=title == "Over time")
             for ending, who in owners.items()
             if there(file.format(ending))
         ]
@@ -187,5 +188,5 @@ def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[Content]:
         ]
         for metric in found
     ]
-    text = "docs/metrics.md defines each metric."
+    text = "`phonotaxis columns --metrics` describes each metric."
     return [text, Table(["", *(result.several or [""])], rows)]

@@ -26,25 +26,24 @@ from diagrams import RunResult, Scenario
 from diagrams.scenario.participants import HasRangeSensors, Robot
 from systems.base.robot import RobotParameters
 from systems.world.geometry import rotate
+from systems.world.shapes import Shape
 
 #: Heights of the bodies, m. The model has no heights, so these values are only for the
 #: display.
 ROBOT_HEIGHT_M, BODY_HEIGHT_M = 0.16, 0.35
 
 
-class Box(NamedTuple):
+class Obstacle(NamedTuple):
     """An obstacle."""
 
-    length: float
-    width: float
+    shape: Shape
     height: float
 
 
 class Touched(NamedTuple):
     """A body that a robot has touched. It is shown from the collision on."""
 
-    length: float
-    width: float
+    shape: Shape
     height: float
 
 
@@ -226,10 +225,14 @@ def make_scene(result: RunResult) -> Scene:
         *_estimates(result, found),
         *_known_floor(result, found),
         *_trails(result, found),
-        *_walls(scenario),
-        *_odor(scenario),
+        *still_layers(scenario),
     ]
     return Scene(result, found, layers)
+
+
+def still_layers(scenario: Scenario) -> list[Layer]:
+    """Makes the layers that do not depend on the run: the room and the odor source."""
+    return [*_walls(scenario), *_odor(scenario)]
 
 
 def scene_bodies(
@@ -264,9 +267,9 @@ def scene_bodies(
     for each in scenario.obstacles:
         poses = each.path().poses(times if each.path().moves else times[:1])
         label = "moving obstacle" if each.path().moves else "obstacle at rest"
-        box, path = Box(*each.size_m, BODY_HEIGHT_M), f"obstacles/{each.name}"
+        solid, path = Obstacle(each.shape(), BODY_HEIGHT_M), f"obstacles/{each.name}"
         color = COLORS["obstacle"]
-        found[each.name] = Thing(path, box, color, times, poses, each.name, label)
+        found[each.name] = Thing(path, solid, color, times, poses, each.name, label)
     return found
 
 
@@ -283,7 +286,7 @@ def _robot_colors(scenario: Scenario) -> dict[str, str]:
     return dict(zip(scenario.robots, cycle(ROBOT_COLORS), strict=False))
 
 
-def _estimate_colors(scenario: Scenario) -> dict[str, str]:
+def estimate_colors(scenario: Scenario) -> dict[str, str]:
     """Returns the color of the target position that each robot assumes, by name."""
     if len(scenario.robots) == 1:
         return dict.fromkeys(scenario.robots, COLORS["estimate"])
@@ -301,11 +304,12 @@ def _robots(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
                 call = call_time(own)
                 start = own.simulated_s if call is None else call + sound.start_s
                 sound = sound.model_copy(update={"start_s": start})
-            things.append(_rings(body, sound_bursts(sound, result.simulated_s)))
+            things.append(rings_of(body, sound_bursts(sound, result.simulated_s)))
         yield Layer(name, f"law {law}", (body.color,), things, switched=False)
 
 
-def _rings(body: Thing, bursts: list[tuple[float, float]]) -> Thing:
+def rings_of(body: Thing, bursts: list[tuple[float, float]]) -> Thing:
+    """Makes the rings around a body. ``bursts`` are as in ``Rings``."""
     path, at_rest = f"{body.path}/rings", np.zeros((1, 3))
     rings = Rings(bursts)
     return Thing(path, rings, body.color, body.times, at_rest, parent=body)
@@ -317,7 +321,7 @@ def _sources(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
         body, meaning = bodies[name], "what is followed"
         if body.color == COLORS["interferer"]:
             meaning = "emits sound, and the robot does not follow it"
-        rings = _rings(body, sound_bursts(source.sound, result.simulated_s))
+        rings = rings_of(body, sound_bursts(source.sound, result.simulated_s))
         yield Layer(name, meaning, (body.color,), [body, rings], switched=False)
 
 
@@ -335,16 +339,14 @@ def _collisions(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Laye
         hit, robot = own.collision, bodies[name]
         after = own.time >= hit.time - 1e-9
         after[-1] = True
-        x, y, theta, length, width = own.surroundings.bodies[hit.object].rectangle(
-            hit.time
-        )
+        body = own.surroundings.bodies[hit.object]
         carrier, place = bodies.get(hit.object), np.zeros((1, 3))
         if carrier is None:
-            place = np.array([[x, y, theta]])
+            place = np.array([body.path.pose(hit.time)])
         things.append(
             Thing(
                 f"{carrier.path if carrier else 'collision/' + robot.path}/hit",
-                Touched(length, width, BODY_HEIGHT_M),
+                Touched(body.shape, BODY_HEIGHT_M),
                 color,
                 own.time,
                 place,
@@ -370,17 +372,12 @@ def _collisions(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Laye
 
 def _cones(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
     things = [
-        Thing(
-            f"{bodies[name].path}/cone_{sensor + 1}",
-            Cone(
-                float(own.scenario.sensing.ultrasonic.half_angles[sensor]),
-                own.columns[f"range_{sensor + 1}"],
-                own.columns[f"echo_{sensor + 1}"] > 0.5,
-            ),
-            COLORS["echo"],
-            own.time,
-            sensor_pose(own.scenario.only, sensor)[None],
-            parent=bodies[name],
+        cone_of(
+            bodies[name],
+            own.scenario.only,
+            sensor,
+            own.columns[f"range_{sensor + 1}"],
+            own.columns[f"echo_{sensor + 1}"] > 0.5,
         )
         for name, own in result.robots.items()
         for sensor in _logged_sensors(own)
@@ -388,6 +385,25 @@ def _cones(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
     colors, meaning = (COLORS["echo"], COLORS["empty"]), "with or without an echo"
     if things:
         yield Layer("cones", f"ultrasonic; {meaning}", colors, things)
+
+
+def cone_of(
+    body: Thing,
+    robot: Robot,
+    sensor: int,
+    reach: NDArray[np.float64],
+    echo: NDArray[np.bool_],
+) -> Thing:
+    """Makes the cone of a range sensor of a robot.
+
+    ``sensor`` is the index of the sensor, from 0. ``reach`` and ``echo`` are as in
+    ``Cone``, at the times of the robot's body.
+    """
+    assert isinstance(robot, HasRangeSensors)
+    half_angle = float(robot.ultrasonic.half_angles[sensor])
+    path, place = f"{body.path}/cone_{sensor + 1}", sensor_pose(robot, sensor)[None]
+    cone, color = Cone(half_angle, reach, echo), COLORS["echo"]
+    return Thing(path, cone, color, body.times, place, parent=body)
 
 
 def _logged_sensors(result: RunResult) -> range:
@@ -425,7 +441,7 @@ def compose(
 
 def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
     scenario, things = result.full_scenario, []
-    colors = _estimate_colors(scenario)
+    colors = estimate_colors(scenario)
     routes = any(robot.kind == "router" for robot in scenario.robots.values())
     for name, own in result.robots.items():
         robot, columns = own.scenario.only, own.columns
@@ -448,7 +464,8 @@ def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer
         height = BODY_HEIGHT_M + (0.07 if jumps else -0.05)
         things.append(replace(ball, height=height, jumps=jumps))
         if robot.kind == "router":
-            things.append(_goal(own, bodies[name], several=bool(result.several)))
+            goal_m = own.scenario.router.route.goal_m
+            things.append(goal_of(goal_m, bodies[name], several=bool(result.several)))
     label, meaning = "estimates", "where the robot assumes the source"
     if routes:
         label, meaning = "targets", "the target on the route"
@@ -456,10 +473,11 @@ def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer
         yield Layer(label, meaning, tuple(colors.values()), things)
 
 
-def _goal(own: RunResult, body: Thing, *, several: bool) -> Thing:
+def goal_of(goal_m: tuple[float, float], body: Thing, *, several: bool) -> Thing:
+    """Makes the goal of a robot's route, at ``goal_m`` in W, m."""
     path, label = f"goals/{body.path}", "goals" if several else "goal"
-    place = np.array([[*own.scenario.router.route.goal_m, 0.0]])
-    goal = Thing(path, Goal(), body.color, own.time, place, "", label)
+    place = np.array([[*goal_m, 0.0]])
+    goal = Thing(path, Goal(), body.color, body.times, place, "", label)
     return replace(goal, height=0.006, alpha=0.6)
 
 
@@ -497,7 +515,7 @@ def _trails(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
         things.append(_trail(f"trail/{body.path}", places, body, "-", label))
         if own.scenario.only.kind != "router":
             continue
-        tinted = replace(body, color=_estimate_colors(scenario)[name])
+        tinted = replace(body, color=estimate_colors(scenario)[name])
         label = "paths of the targets" if several else "path of the target"
         path, places = f"trail/target/{body.path}", own.vector("target")
         things.append(_trail(path, places, tinted, ":", label))

@@ -12,6 +12,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
 from diagrams.building.robot import (
+    SHOWN,
     Parts,
     make_robot,
     make_source,
@@ -19,6 +20,7 @@ from diagrams.building.robot import (
     multiplexed,
     parts_of,
 )
+from diagrams.building.signals import Signal
 from diagrams.scenario.scenario import ODOR, WORLD, Scenario
 from systems import Obstacles
 from systems.framework.input_error import InputError
@@ -94,16 +96,29 @@ class SoundFollower:
         return self.blocks[part].GetOutputPort(name)
 
 
-def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollower:
+def build_sound_follower(
+    scenario: Scenario,
+    *,
+    log: bool = False,
+    signals: Mapping[str, Mapping[str, Signal]] | None = None,
+) -> SoundFollower:
     """Builds the diagram of a scenario with all its robots, sources and obstacles.
 
     Each robot and each source is a diagram inside this diagram (``make_robot``,
     ``make_source``). Each robot can see and hit the obstacles, the other robots and the
     sources, and it hears all sounds.
 
+    You can add the diagram to a diagram of your own. Its outputs are, for example,
+    ``robot.pose_WB`` and ``robot.velocity_WB`` of each robot, ``source.pose_WS`` of
+    each source, and ``obstacles.poses_WO``. A robot also has the further outputs of
+    ``make_robot`` that show what it senses, for example ``robot.p_WS_estimated``.
+
     Args:
         scenario: The scenario to build.
         log: Whether each robot logs the columns of its blocks.
+        signals: Signals that replace quantities of a robot, by name of the robot and
+            then by name of the quantity. A signal is a function of the time in s. All
+            blocks of the robot then read the signal instead of the quantity.
 
     Returns:
         The diagram, with the blocks of each robot and source.
@@ -111,7 +126,9 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     Raises:
         InputError: The law is not known.
         InputError: A sound file cannot be played.
+        InputError: No block of the robot reads a quantity in ``signals``.
     """
+    driven = signals or {}
     builder = DiagramBuilder()
     audible = audible_sounds(scenario)
     sources = {
@@ -119,7 +136,10 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
         for name, source in scenario.sources.items()
     }
     obstacles = Obstacles(obstacles=scenario.obstacles)
-    followers = {name: robot_of(scenario, name, log=log) for name in scenario.robots}
+    followers = {
+        name: robot_of(scenario, name, log=log, signals=driven.get(name))
+        for name in scenario.robots
+    }
     systems = [*sources.items(), ("obstacles", obstacles), *followers.items()]
     shared = make_world(scenario, log=log)
     if shared is not None:
@@ -129,6 +149,9 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     world = _World(builder, scenario, obstacles, sources, followers, shared)
     for name in followers:
         world.surround(name)
+    _export(builder, followers, ("pose_WB", "velocity_WB", *SHOWN))
+    _export(builder, sources, ("pose_WS", "v_WS"))
+    _export(builder, {"obstacles": obstacles}, ("poses_WO",))
     diagram = builder.Build()
     diagram.set_name("sound_follower")
     return SoundFollower(
@@ -141,6 +164,16 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     )
 
 
+def _export(
+    builder: DiagramBuilder, systems: Mapping[str, Any], ports: tuple[str, ...]
+) -> None:
+    """Makes outputs of systems to outputs of the diagram, named ``<system>.<port>``."""
+    for name, system in systems.items():
+        for port in ports:
+            if system.HasOutputPort(port):
+                builder.ExportOutput(system.GetOutputPort(port), f"{name}.{port}")
+
+
 def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
     """Returns the sounds of a scenario, provided that a robot hears sound as waves.
 
@@ -151,7 +184,13 @@ def audible_sounds(scenario: Scenario) -> Mapping[str, SoundParameters]:
     return scenario.sounds() if listens else {}
 
 
-def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
+def robot_of(
+    scenario: Scenario,
+    name: str,
+    *,
+    log: bool = False,
+    signals: Mapping[str, Signal] | None = None,
+) -> Diagram:
     """Builds the diagram of one robot of a scenario with ``make_robot``.
 
     If no robot hears the robot's loudspeaker, the diagram has no loudspeaker.
@@ -161,21 +200,24 @@ def robot_of(scenario: Scenario, name: str, *, log: bool = False) -> Diagram:
         name: Name of the robot.
         log: Whether the diagram logs the columns of its blocks at every tick (control
             period).
+        signals: Signals that replace quantities of the robot, see ``make_robot``.
 
     Returns:
         The diagram, see ``make_robot``.
     """
     own, target = scenario.of_robot(name), scenario.target(name)
+    around = scenario.surroundings(name)
     if name not in audible_sounds(scenario):
         own = own.with_robot(loudspeaker=None)
     return make_robot(
         own,
         name,
-        bodies=len(scenario.surroundings(name).obstacles),
+        owners=around.owners,
         robots=scenario.robots_seen(name),
         others=[each for each in scenario.sounds() if each != target],
         listeners_frame_s=scenario.longest_frame_s,
         log=log,
+        signals=signals,
     )
 
 
@@ -207,10 +249,11 @@ class _World:
         self._give(name, "emission", lambda: self._emission(target))
         for other in self.scenario.sounds():
             self._give(name, f"emission_{other}", lambda o=other: self._emission(o))
-        boxes = len(self.scenario.obstacles)
-        others = dict([*around.obstacles.items()][boxes:])
+        obstacles = len(self.scenario.obstacles)
+        others = dict([*around.obstacles.items()][obstacles:])
         poses = [self._pose(other) for other in others]
-        sizes = [extent for body in others.values() for extent in body.size]
+        shapes = [body.shape for body in others.values()]
+        sizes = [extent for shape in shapes for extent in shape.rectangles[0, 3:]]
         self._give(name, "poses_WO", lambda: self._joined(name, "poses_WO", poses))
         self._give(
             name,

@@ -10,7 +10,9 @@ from pydrake.systems.framework import LeafSystem
 from diagrams.building.own_laws import checked_law, try_law
 from diagrams.building.robots.routed_robot import make_trajectory_controller
 from diagrams.building.robots.searching_robot import search_controller
-from diagrams.scenario.own_code import asked_for, import_own, made
+from diagrams.scenario.own_classes import asked_for, made
+from diagrams.scenario.own_code import import_own
+from diagrams.scenario.own_gains import check_own_gains, law_arguments, set_gains
 from diagrams.scenario.participants import (
     Follower,
     HasRangeSensors,
@@ -36,10 +38,10 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     name of a user's law is ``package.module:Name`` or ``path/to/file.py:Name``. Python
     also searches the working directory. A user's law is a function or a class:
 
-    - A function ``law(c, s, laws)`` returns the force away from an obstacle, N. c is
-      the distance of the obstacle, m, and s is its speed, m/s. ``laws`` contains the
-      gains of all laws of the package. ``make_controller`` tests the function at
-      several distances and speeds.
+    - A function ``law(c, s)`` or ``law(c, s, laws)`` returns the force away from an
+      obstacle, N. c is the distance of the obstacle, m, and s is its speed, m/s.
+      ``laws`` contains the gains of all laws of the package. ``make_controller`` tests
+      the function at several distances and speeds.
     - A class derives from LeafSystem. Each of its input ports has the name of an output
       port in the diagram. It has exactly one of the output ports that ``make_command``
       accepts. Its constructor can take any of the arguments ``robot``, ``attraction``,
@@ -48,9 +50,11 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
       ``velocity_term`` and ``guard``. If the class derives from the block of a law of
       the package, ``gains`` are the gains of that law.
 
+    Further arguments with a number as default are gains, which ``own_gains`` sets.
+
     Args:
         scenario: Scenario with the law and the parameters of its block.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
+        bodies: Number of rectangles in the inputs ``poses_WO`` and ``sizes``.
         seed: Seed of a law that uses random numbers.
 
     Returns:
@@ -90,16 +94,19 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         if controller is not None:
             return controller(**asked_for(controller, parts))
         return _radial(LAWS[name], parts)
+    check_own_gains(robot)
     law = import_own(name, "law")
     if inspect.isclass(law):
         gains = robot.gains
         if isinstance(robot, Follower):
             gains = _gains_of_base(law, robot.laws)
-        return _own_block(name, law, {**parts, "laws": robot.laws, "gains": gains})
+        parts |= {"laws": robot.laws, "gains": gains}
+        return _own_block(name, law, parts | set_gains(law, robot.own_gains))
     function = checked_law(name, law)
+    arguments = law_arguments(law, robot.laws, robot.own_gains)
     reach, top_speed = robot.ultrasonic.maximum_range_m, robot.robot.top_speed_m_s
-    try_law(function, robot.laws, reach, top_speed)
-    return _radial(function, {**parts, "gains": robot.laws})
+    try_law(function, arguments, reach, top_speed)
+    return _radial(function, {**parts, "arguments": arguments})
 
 
 def _radial(law: Any, parts: dict[str, Any]) -> Any:

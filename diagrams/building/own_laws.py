@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 
 from diagrams.scenario.own_code import is_interrupt, why
-from diagrams.scenario.participants import LawGains
+from diagrams.scenario.own_gains import keyword_only
 from systems.framework.input_error import InputError, shortened
 
 
@@ -20,19 +20,24 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
 
     Args:
         name: Name of the law, for the error message.
-        law: Function ``law(c, s, laws)`` that returns the force away from an obstacle,
-            N. c is the distance of the obstacle, m, and s is its speed, m/s. ``laws``
-            contains the gains of all laws of the package.
+        law: Function ``law(c, s, ...)`` that returns the force away from an obstacle,
+            N. c is the distance of the obstacle, m, and s is its speed, m/s. Further
+            arguments are those of ``law_arguments``.
 
     Returns:
         A function with the same arguments. It returns a finite force, N, as a float or
         AutoDiffXd, or raises an InputError.
     """
+    named = keyword_only(law)
 
     @functools.wraps(law)
-    def checked(c: Any, s: Any, laws: LawGains) -> Any:
+    def checked(c: Any, s: Any, *arguments: Any) -> Any:
+        given, keywords = arguments, {}
+        if named:
+            given = arguments[: -len(named)]
+            keywords = dict(zip(named, arguments[-len(named) :], strict=True))
         try:
-            force = law(c, s, laws)
+            force = law(c, s, *given, **keywords)
         except BaseException as error:  # a user's law may raise any exception
             if is_interrupt(error):
                 raise
@@ -55,7 +60,7 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
 
 def try_law(
     law: Callable[..., Any],
-    laws: LawGains,
+    arguments: tuple[Any, ...],
     range_m: float,
     top_speed_m_s: float,
 ) -> None:
@@ -64,7 +69,7 @@ def try_law(
     Args:
         law: A function from ``checked_law``, which raises an error if a result is
             invalid.
-        laws: Gains of all laws.
+        arguments: Arguments of the law after the distance and the speed.
         range_m: Largest tested distance of an obstacle, m.
         top_speed_m_s: Largest tested speed of an obstacle, m/s.
 
@@ -73,7 +78,7 @@ def try_law(
     """
     for share in (1e-3, 0.1, 0.5, 1.0):
         for s in (0.0, 0.5 * top_speed_m_s, top_speed_m_s):
-            law(share * range_m, s, laws)
+            law(share * range_m, s, *arguments)
 
 
 def _failed(name: str, c: Any, s: Any, what: str) -> InputError:
@@ -81,8 +86,8 @@ def _failed(name: str, c: Any, s: Any, what: str) -> InputError:
     at = f"c = {_number(c):.3g} m, s = {_number(s):.3g} m/s"
     return InputError(
         "law",
-        f"{name!r} {what} at {at}; write law(c, s, laws) that returns a finite "
-        "force in N",
+        f"{name!r} {what} at {at}; write law(c, s) or law(c, s, laws) that returns a "
+        "finite force in N",
     )
 
 

@@ -18,6 +18,7 @@ from diagrams.building.own_blocks import with_own_blocks
 from diagrams.building.robots.following_robot import following_blocks
 from diagrams.building.robots.routed_robot import routed_blocks, trajectory_command
 from diagrams.building.robots.searching_robot import search_command, searching_blocks
+from diagrams.building.signals import Signal, signal_sources
 from diagrams.building.world_blocks import world_blocks
 from diagrams.scenario.participants import Follower, Router, SourceParameters
 from diagrams.scenario.scenario import WORLD, Scenario
@@ -39,6 +40,9 @@ from systems.sound.parameters import SoundParameters
 #: Inputs of a robot that come from outside of its diagram. ``emission`` also stands for
 #: all inputs ``emission_<name>``.
 OUTSIDE = "pose_WS", "poses_WO", "sizes", "emission", "wind", "plume", "air"
+
+#: Outputs of a robot that a live view shows, see ``make_robot``.
+SHOWN = "echo", "p_WS_estimated", "target_state", "target_valid"
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,7 @@ def robot_blocks(
     scenario: Scenario,
     name: str = ROBOT,
     *,
-    bodies: int = 0,
+    owners: Sequence[int] = (),
     robots: Sequence[int] = (),
     others: Sequence[str] = (),
 ) -> dict[str, Any]:
@@ -150,8 +154,9 @@ def robot_blocks(
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         name: Name of the robot. The random numbers of the robot depend on its name.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
-        robots: Indices of those bodies that are robots.
+        owners: Number of the body of each rectangle in the inputs ``poses_WO`` and
+            ``sizes``, ascending from 0.
+        robots: Numbers of those bodies that are robots.
         others: Names of the sources and loudspeakers that the robot does not follow.
 
     Returns:
@@ -163,22 +168,22 @@ def robot_blocks(
     """
     robot, own_seed = scenario.only, partial(seed_of, scenario, owner=name)
     seed = own_seed("controller")
-    controller = make_controller(scenario, bodies=bodies, seed=seed)
+    controller = make_controller(scenario, bodies=len(owners), seed=seed)
     if robot.searches is not None:
         sensing = searching_blocks(
             scenario,
-            bodies=bodies,
+            owners=owners,
             others=others,
             seed_of=own_seed,
         )
     elif isinstance(robot, Follower):
         sensing = following_blocks(
-            scenario, controller, bodies=bodies, others=others, seed_of=own_seed
+            scenario, controller, owners=owners, others=others, seed_of=own_seed
         )
     else:
         with fields_of("robots", name):
             sensing = routed_blocks(
-                scenario, bodies=bodies, robots=robots, seed_of=own_seed
+                scenario, owners=owners, robots=robots, seed_of=own_seed
             )
     ours = [
         DiffDrivePlant(
@@ -197,11 +202,11 @@ def robot_blocks(
     ]
     return with_own_blocks(
         {part_of(block): block for block in ours},
-        robot.blocks,
+        robot,
         {
             "scenario": scenario,
             "robot": robot.robot,
-            "bodies": bodies,
+            "bodies": len(owners),
             "tick_s": scenario.tick_s,
             "seed": seed_of(scenario, "own_block", name),
         },
@@ -212,11 +217,12 @@ def make_robot(
     scenario: Scenario,
     name: str = ROBOT,
     *,
-    bodies: int = 0,
+    owners: Sequence[int] = (),
     robots: Sequence[int] = (),
     others: Sequence[str] = (),
     listeners_frame_s: float = TICK_S,
     log: bool = False,
+    signals: Mapping[str, Signal] | None = None,
 ) -> Diagram:
     """Builds the diagram of a robot.
 
@@ -233,19 +239,24 @@ def make_robot(
     - ``emission_<name>`` of each other source
     - ``wind``, ``plume`` and ``air`` of the world
 
-    The outputs are ``pose_WB`` and ``velocity_WB``. A robot with a loudspeaker also has
-    ``own_emission``. A robot that searches also has ``frames``.
+    The outputs are ``pose_WB`` and ``velocity_WB``, and those of ``echo``,
+    ``p_WS_estimated``, ``target_state`` and ``target_valid`` that a block publishes. A
+    robot with a loudspeaker also has ``own_emission``. A robot that searches also has
+    ``frames``.
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         name: Name of the robot. The random numbers of the robot depend on its name.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
-        robots: Indices of those bodies that are robots.
+        owners: Number of the body of each rectangle in the inputs ``poses_WO`` and
+            ``sizes``, ascending from 0.
+        robots: Numbers of those bodies that are robots.
         others: Names of the sources and loudspeakers that the robot does not follow.
         listeners_frame_s: Longest audio frame of the robots that hear the loudspeaker,
             s.
         log: Whether the diagram logs the columns of its blocks at every tick (control
             period).
+        signals: Signals that replace quantities of the robot, by name of the quantity,
+            see ``signal_sources``.
 
     Returns:
         The diagram. ``parts_of`` returns its blocks by part (role of the block).
@@ -253,14 +264,21 @@ def make_robot(
     Raises:
         InputError: The law is not known, or a sound file cannot be played.
     """
-    by_part = robot_blocks(scenario, name, bodies=bodies, robots=robots, others=others)
+    by_part = robot_blocks(scenario, name, owners=owners, robots=robots, others=others)
     blocks, plant = [*by_part.values()], by_part["plant"]
+    given = signal_sources(blocks, signals or {}, scenario.tick_s)
+    # The log keeps the last of several columns of the same name, that of the signal.
+    blocks += given
     builder = DiagramBuilder()
     for block in blocks:
         builder.AddNamedSystem(block.get_name(), block)
-    connect_by_name(builder, blocks, OUTSIDE)
+    connect_by_name(builder, blocks, OUTSIDE, given)
     for port in ("pose_WB", "velocity_WB"):
         builder.ExportOutput(plant.GetOutputPort(port), port)
+    for port in SHOWN:
+        publishers = [block for block in blocks if block.HasOutputPort(port)]
+        if len(publishers) == 1:
+            builder.ExportOutput(publishers[0].GetOutputPort(port), port)
     robot = scenario.only
     if robot.searches is not None:
         builder.ExportOutput(by_part["controller"].GetOutputPort("frames"), "frames")
@@ -402,7 +420,10 @@ def _driving(scenario: Scenario, controller: Any) -> Any:
 
 
 def connect_by_name(
-    builder: DiagramBuilder, blocks: Sequence[Any], outside: Sequence[str] = ()
+    builder: DiagramBuilder,
+    blocks: Sequence[Any],
+    outside: Sequence[str] = (),
+    replacing: Sequence[Any] = (),
 ) -> None:
     """Connects each input port of the blocks to the only output port of the same name.
 
@@ -415,6 +436,7 @@ def connect_by_name(
         outside: Names of quantities that become inputs of the diagram. The name
             ``emission``, for example, also selects all inputs whose names begin with
             ``emission_``.
+        replacing: Blocks whose outputs replace other outputs of the same name.
 
     Raises:
         InputError: Several blocks publish a quantity that a block needs.
@@ -427,6 +449,9 @@ def connect_by_name(
             port = block.get_output_port(index)
             outputs[port.get_name()] = port
             counts[port.get_name()] += 1
+    for block in replacing:
+        port = block.get_output_port(0)
+        outputs[port.get_name()], counts[port.get_name()] = port, 1
     entries: dict[str, Any] = {}
     for block in blocks:
         for index in range(block.num_input_ports()):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from pydrake.systems.framework import EventStatus
@@ -24,9 +25,16 @@ class Monitor:
     Args:
         follower: The diagram with its robots and sources.
         audio: Open files for the sound of the run, or None to save no sound.
+        progress: Function that is called at every tick with its time, s, or None.
     """
 
-    def __init__(self, follower: SoundFollower, audio: RunAudio | None = None) -> None:
+    def __init__(
+        self,
+        follower: SoundFollower,
+        audio: RunAudio | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        self._progress = progress
         self.referee = Referee(follower.scenario)
         self._diagram, self._tick_s = follower.diagram, follower.scenario.tick_s
         self._audio, self._tick = audio, -1
@@ -62,6 +70,8 @@ class Monitor:
         self._tick = tick
         if context is not self._root:
             self._root, self._contexts = context, {}
+        if self._progress is not None:
+            self._progress(time)
         if self._audio is not None:
             self._audio.save(tick, self._read)
         for number, name in enumerate(referee.steps):

@@ -26,7 +26,6 @@ from diagrams.running.stop_rules import (
 from diagrams.scenario.bodies import Body, RecordedPath, robot_rectangle
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import Step
-from systems.world.geometry import rectangle_clearance
 
 #: The rules check for contacts at the ends of equal parts of a tick. ``BETWEEN_TICKS``:
 #: least number of parts. ``_PART_M``: greatest distance that a body may move in one
@@ -150,8 +149,8 @@ class Referee:
         robot_then, robot_now = (
             robot_rectangle(paths[name].pose(time), own) for time in (begin, instant)
         )
-        robot_alone = rectangle_clearance(robot_now, hit.rectangle(begin))
-        body_alone = rectangle_clearance(robot_then, hit.rectangle(instant))
+        robot_alone = hit.clearance(robot_now, begin)
+        body_alone = hit.clearance(robot_then, instant)
         fault = "robot" if robot_alone <= body_alone else "obstacle"
         return Collision(touched, fault, instant)
 
@@ -161,14 +160,15 @@ def _numbers_of(scenario: Scenario, name: str) -> RefereeNumbers:
     robots, bodies = [*scenario.robots], {**around.bodies}
     rests = not around.followed.path.moves
     # A goal has no body. It comes after the bodies, and cannot be touched.
-    target = [*bodies, around.target].index(around.target)
     if around.goal is not None:
         bodies[around.target] = around.followed
+    table = _table_of(bodies, own, robots, touchable=len(around.bodies))
+    target = [*bodies].index(around.target)
     return RefereeNumbers(
         robots.index(name),
-        own.only.size,
-        target,
-        _table_of(bodies, own, robots, touchable=len(around.bodies)),
+        (*own.only.size, 0.0),
+        int(np.argmax(table.owners == target)),
+        table,
         RuleNumbers(
             own.stop,
             own.only.robot.control_point_m,
@@ -195,40 +195,47 @@ def _table_of(
     times: NDArray[np.float64] = own.tick_s * np.arange(ticks + 1.0)
     moving = {n: b for n, b in bodies.items() if b.path.moves and n not in robots}
     instants = _instants(times, BETWEEN_TICKS)
-    poses = {name: body.path.poses(instants) for name, body in moving.items()}
-    farthest = {
-        name: float(np.hypot(*np.diff(rows[:, :2], axis=0).T).max(initial=0.0))
-        for name, rows in poses.items()
-    }
-    parts = max(1, math.ceil(max(farthest.values(), default=0.0) / _PART_M))
-    parts *= BETWEEN_TICKS
-    rows, tables, size = np.zeros((len(bodies), 2), dtype=np.int64), [], 0
-    for row, (name, body) in zip(rows, bodies.items(), strict=True):
+    poses = {n: body.rectangles_over(instants)[..., :3] for n, body in moving.items()}
+    farthest = {name: _longest_ways(rows) for name, rows in poses.items()}
+    most = max((float(ways.max()) for ways in farthest.values()), default=0.0)
+    parts = max(1, math.ceil(most / _PART_M)) * BETWEEN_TICKS
+    rows, tables, size = [], [], 0
+    for name, body in bodies.items():
         if name in robots:
-            continue
-        if name not in moving:
-            table = np.repeat(body.path.poses(times[:1]), parts + 1, axis=0)
+            table = np.empty((1, 0, 3))
+        elif name not in moving:
+            at_rest = body.rectangles_over(times[:1])[..., :3]
+            table = np.repeat(at_rest, parts + 1, axis=1)
         elif parts == BETWEEN_TICKS:
             table = poses[name]
         else:
-            table = body.path.poses(_instants(times, parts))
-        row[:] = size, parts if name in moving else 0
-        tables.append(table)
-        size += len(table)
-    reach = [
-        0.5 * (math.hypot(*own.only.size) + math.hypot(*body.size))
-        for body in bodies.values()
-    ]
-    reach[touchable:] = [-math.inf] * (len(bodies) - touchable)
+            table = body.rectangles_over(_instants(times, parts))[..., :3]
+        for each in table:
+            rows.append((size, parts if name in moving else 0))
+            tables.append(each)
+            size += len(each)
+    counts = [len(body.shape.rectangles) for body in bodies.values()]
+    sizes = np.concatenate([body.shape.rectangles[:, 3:] for body in bodies.values()])
+    owners = np.repeat(np.arange(len(bodies)), counts)
+    steps = [farthest.get(n, np.zeros(k)) for n, k in zip(bodies, counts, strict=True)]
+    reach = sizes[:, 2] + 0.5 * (math.hypot(*own.only.size) + np.hypot(*sizes.T[:2]))
+    reach[owners >= touchable] = -math.inf
     return BodyTable(
-        np.array([body.size for body in bodies.values()], dtype=float),
-        np.array(reach),
-        np.array([BETWEEN_TICKS * farthest.get(name, 0.0) for name in bodies]),
-        np.array([robots.index(n) if n in robots else -1 for n in bodies]),
+        owners,
+        sizes,
+        reach,
+        BETWEEN_TICKS * np.concatenate(steps),
+        np.array([robots.index(n) if n in robots else -1 for n in bodies])[owners],
         parts,
-        rows,
-        np.concatenate([np.empty((0, 3)), *tables]),
+        np.array(rows, dtype=np.int64),
+        np.concatenate(tables),
     )
+
+
+def _longest_ways(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) longest ways, m, between successive poses (k, n, 3) of k rectangles."""
+    steps = np.diff(poses[..., :2], axis=1)
+    return np.hypot(steps[..., 0], steps[..., 1]).max(axis=1, initial=0.0)
 
 
 def _instants(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:

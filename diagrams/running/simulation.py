@@ -52,6 +52,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     engine: Engine | None = None,
     audio: RunAudio | None = None,
+    realtime_rate: float = 0.0,
 ) -> RunResult:
     """Runs a scenario to its end.
 
@@ -67,6 +68,9 @@ def simulate(
             blocks; the compiled code stays on the disk. None selects the engine of the
             scenario, where ``auto`` means ``drake``.
         audio: Open files for the sound of the run, or None to save no sound.
+        realtime_rate: Greatest ratio of simulated time to real time. Drake's simulator
+            waits if it is faster, and calls ``progress`` at every tick (control
+            period). 0: as fast as possible.
 
     Returns:
         The result of the run.
@@ -89,7 +93,9 @@ def simulate(
         )
     load_compiled_code(follower)
     simulator = make_simulator(follower)
-    monitor = Monitor(follower, audio)
+    simulator.set_target_realtime_rate(realtime_rate)
+    often = progress if realtime_rate else None
+    monitor = Monitor(follower, audio, often)
     simulator.set_monitor(monitor)
     start = perf_counter()
     simulator.Initialize()

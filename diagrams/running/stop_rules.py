@@ -15,11 +15,8 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from diagrams.scenario.run_parameters import StopParameters
-from systems.world.geometry import (
-    control_point,
-    control_point_velocity,
-    first_overlap,
-)
+from systems.world.contacts import first_overlap
+from systems.world.geometry import control_point, control_point_velocity
 
 #: Causes of successful runs.
 SUCCESSFUL = ("reached", "completed", "found")
@@ -243,26 +240,28 @@ def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> in
 class BodyTable(NamedTuple):
     """The bodies that a robot can touch, and the target of this robot."""
 
+    owners: NDArray[np.int64]
+    """(n,) number of the body of each rectangle. A body has one or more rectangles."""
     sizes: NDArray[np.float64]
-    """(n, 2) lengths and widths, m."""
+    """(n, 3) lengths, widths and radii of the rectangles, m."""
     reach: NDArray[np.float64]
-    """(n,) distances between the centers of robot and body, m, beyond which they cannot
-    touch. The value is -inf for a goal, which has no body.
+    """(n,) distances between the centers of robot and rectangle, m, beyond which they
+    cannot touch. The value is -inf for a goal, which has no body.
     """
     steps: NDArray[np.float64]
-    """(n,) upper bounds of the distances that the bodies move in a tick (control
-    period), m; 0 for robots.
+    """(n,) upper bounds of the distances that the centers of the rectangles move in a
+    tick (control period), m; 0 for robots.
     """
     robots: NDArray[np.int64]
-    """(n,) number of the robot if the body is a robot; otherwise -1."""
+    """(n,) number of the robot if the rectangle is a robot; otherwise -1."""
     parts: int
     """Number of equal parts of a tick. Poses are known at the end of each part."""
     rows: NDArray[np.int64]
-    """(n, 2) two numbers for each body: the row in ``poses`` of the first tick, and the
-    number of rows per tick (0 for a body at rest).
+    """(n, 2) two numbers for each rectangle: the row in ``poses`` of the first tick,
+    and the number of rows per tick (0 for a body at rest).
     """
     poses: NDArray[np.float64]
-    """(m, 3) poses (x, y, theta) in the world frame W of the bodies that are not
+    """(m, 3) poses (x, y, theta) in the world frame W of the rectangles that are not
     robots, m and rad. Each tick is divided into parts, and there is one row for the end
     of each part.
     """
@@ -273,10 +272,10 @@ class RefereeNumbers(NamedTuple):
 
     robot: int
     """Number of the robot that is judged."""
-    size: tuple[float, float]
-    """Length and width of the robot, m."""
+    size: tuple[float, float, float]
+    """Length and width of the robot, m, and 0."""
     target: int
-    """Number of the target among the bodies."""
+    """Row of the target in ``bodies``."""
     bodies: BodyTable
     rules: RuleNumbers
     tick_s: float
@@ -337,7 +336,7 @@ def judge_robot(
     if not ((switches[0] > 0.5 or switches[1] > 0.5) and body[0] >= 0.0):
         touched, part = _first_touched(tick, state, numbers)
     pose = state.now[numbers.robot]
-    target = _pose_of_body(numbers.target, tick, state, numbers.bodies)
+    target = _pose_of(numbers.target, tick, state, numbers.bodies)
     if touched >= 0:
         state.contact[0], state.contact[1], state.contact[2] = touched, part, tick
         state.found[0] = _COLLISION
@@ -358,12 +357,12 @@ def judge_robot(
 
 
 @register_jitable
-def _pose_of_body(
-    body: int, tick: int, state: RefereeState, bodies: BodyTable
+def _pose_of(
+    row: int, tick: int, state: RefereeState, bodies: BodyTable
 ) -> NDArray[np.float64]:
-    if bodies.robots[body] >= 0:
-        return state.now[bodies.robots[body]]
-    return bodies.poses[bodies.rows[body, 0] + bodies.rows[body, 1] * tick]
+    if bodies.robots[row] >= 0:
+        return state.now[bodies.robots[row]]
+    return bodies.poses[bodies.rows[row, 0] + bodies.rows[row, 1] * tick]
 
 
 @register_jitable
@@ -372,7 +371,7 @@ def _first_touched(
 ) -> tuple[int, float]:
     """Returns the first body that a robot has touched in the last control period.
 
-    The function skips bodies that are too far away. For the other bodies,
+    The function skips rectangles that are too far away. For the other rectangles,
     ``first_overlap`` gets the poses at several instants within the period, and also
     finds contacts between these instants. The poses of other robots are interpolated.
     The poses of all other bodies are known in advance.
@@ -384,13 +383,13 @@ def _first_touched(
     pose, before = state.now[numbers.robot], state.before[numbers.robot]
     gone = math.hypot(pose[0] - before[0], pose[1] - before[1])
     touched, first = -1, np.inf
-    for body in range(len(bodies.reach)):
-        robot, step = bodies.robots[body], bodies.steps[body]
-        now = _pose_of_body(body, tick, state, bodies)
+    for row in range(len(bodies.reach)):
+        robot, step = bodies.robots[row], bodies.steps[row]
+        now = _pose_of(row, tick, state, bodies)
         then = state.before[max(robot, 0)]
         if robot >= 0:
             step = math.hypot(now[0] - then[0], now[1] - then[1])
-        near = bodies.reach[body] + gone + step
+        near = bodies.reach[row] + gone + step
         if math.hypot(now[0] - pose[0], now[1] - pose[1]) > near:
             continue
         if robot >= 0:
@@ -399,12 +398,12 @@ def _first_touched(
                 for j in range(3):
                     poses[k, j] = then[j] + k / parts * (now[j] - then[j])
         else:
-            begin = bodies.rows[body, 0] + bodies.rows[body, 1] * max(tick - 1, 0)
+            begin = bodies.rows[row, 0] + bodies.rows[row, 1] * max(tick - 1, 0)
             poses = bodies.poses[begin : begin + (parts + 1 if tick > 0 else 1)]
-        size = bodies.sizes[body]
+        size = bodies.sizes[row]
         part = first_overlap(before, pose, numbers.size, poses, size)
         if part < first:
-            touched, first = body, part
+            touched, first = bodies.owners[row], part
     return touched, first
 
 

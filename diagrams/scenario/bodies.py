@@ -1,7 +1,8 @@
-"""Moving rectangles, and the surroundings of one robot."""
+"""Bodies that rest or move, and the surroundings of one robot."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.base.robot import RobotParameters, microphones_B
-from systems.world.plane import rotate
+from systems.world.plane import beyond_rectangle, rectangle_clearance, rotate
+from systems.world.shapes import Shape, box
 
 
 class Path(Protocol):
@@ -53,20 +55,50 @@ class RecordedPath:
 
 
 class Body(NamedTuple):
-    """A rectangle that moves along a path."""
+    """A shape that moves along a path."""
 
     path: Path
-    """Pose of its center over time."""
-    size: tuple[float, float]
-    """Length and width, m."""
+    """Pose of its axes over time."""
+    shape: Shape
 
-    def rectangle(self, time: float) -> NDArray[np.float64]:
-        """(5,) x, y, theta, length, width in W at a time in s."""
-        return np.array([*self.path.pose(time), *self.size])
+    def rectangles(self, time: float) -> NDArray[np.float64]:
+        """(n, 6) x, y, theta, length, width, radius in W at a time in s."""
+        return self.shape.at(self.path.pose(time))
 
-    def rectangles(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 5) rectangles at several times."""
-        return rectangles_at(self.path.poses(times), self.size)
+    def rectangles_over(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, m, 6) rectangles at m times, see ``rectangles``."""
+        return self.shape.at(self.path.poses(times))
+
+    def distance(self, point: tuple[float, float], time: float) -> float:
+        """Returns the distance of a point in W from the body, m; 0 inside the body.
+
+        ``time`` is in s.
+        """
+        if self.fills(point, time):
+            return 0.0
+        rows = self.rectangles(time)
+        return min(math.hypot(*beyond_rectangle(point, row)) for row in rows)
+
+    def clearance(self, rectangle: NDArray[np.float64], time: float) -> float:
+        """Returns the clearance between the body and a (6,) rectangle in W, m.
+
+        If they overlap, the clearance is negative. Inside a polygon, it is -inf.
+        ``time`` is in s.
+        """
+        if self.fills((rectangle[0], rectangle[1]), time):
+            return -math.inf
+        return min(rectangle_clearance(rectangle, row) for row in self.rectangles(time))
+
+    def fills(self, point: tuple[float, float], time: float) -> bool:
+        """Returns whether a point in W is inside the polygon of the body.
+
+        ``time`` is in s. A body without a polygon has no such points.
+        """
+        if self.shape.polygon is None:
+            return False
+        x, y, theta = self.path.pose(time)
+        own = rotate(-theta, point[0] - x, point[1] - y)
+        return bool(self.shape.fills(own))
 
 
 @dataclass(frozen=True)
@@ -86,7 +118,7 @@ class Surroundings:
     def followed(self) -> Body:
         """The target. If the target is a goal, it has no extent and cannot be hit."""
         if self.goal is not None:
-            return Body(self.goal, (0.0, 0.0))
+            return Body(self.goal, box((0.0, 0.0)))
         return self.bodies[self.target]
 
     @cached_property
@@ -94,22 +126,11 @@ class Surroundings:
         """All bodies except the target."""
         return {k: body for k, body in self.bodies.items() if k != self.target}
 
-
-def rectangles_at(
-    poses: NDArray[np.float64], size: tuple[float, float]
-) -> NDArray[np.float64]:
-    """Returns rectangles of the same size at several poses.
-
-    Args:
-        poses: (n, 3) poses (x, y, theta) of the centers, m and rad.
-        size: Length and width of all rectangles, m.
-
-    Returns:
-        (n, 5) rectangles (x, y, theta, length, width), m and rad.
-    """
-    rectangles = np.empty((len(poses), 5))
-    rectangles[:, :3], rectangles[:, 3:] = poses, size
-    return rectangles
+    @property
+    def owners(self) -> tuple[int, ...]:
+        """Index in ``obstacles`` of the body of each rectangle, in the same order."""
+        counts = [len(body.shape.rectangles) for body in self.obstacles.values()]
+        return tuple(np.repeat(np.arange(len(counts)), counts).tolist())
 
 
 def microphones_W(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
@@ -135,7 +156,7 @@ def robot_rectangle(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.fl
         robot: Parameters of the robot, with its size.
 
     Returns:
-        (5,) rectangle (x, y, theta, length, width) in W, m and rad.
+        (6,) rectangle (x, y, theta, length, width, radius 0) in W, m and rad.
     """
     x, y, theta = np.asarray(pose_WB)
-    return np.array([x, y, theta, robot.length_m, robot.width_m])
+    return np.array([x, y, theta, robot.length_m, robot.width_m, 0.0])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,11 +57,12 @@ def load_scenario(
     from diagrams.scenario.scenario import scenario_from_mapping
     from diagrams.scenario.settings import all_settings, apply_settings, plain_settings
 
+    settings = all_settings(overrides, fields)
     if isinstance(source, Mapping):
         data = {"name": "scenario", **dict(plain_settings(source))}
     else:
         data = written_fields(source)
-    apply_settings(data, all_settings(overrides, fields))
+    apply_settings(data, settings)
     resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
 
@@ -139,15 +141,33 @@ def dump_scenario(scenario: Scenario) -> str:
     return dump_yaml(scenario.model_dump(mode="json"))
 
 
-def write_scenario(scenario: Scenario, directory: Path) -> None:
+def write_scenario(
+    scenario: Scenario, directory: Path, *, relative: bool = False
+) -> None:
     """Writes a whole scenario and a copy of its JSON Schema to an existing directory.
 
-    The files are ``scenario.yaml`` and ``scenario.schema.json``. Text editors use the
+    The files are ``scenario.yaml`` and ``scenario.schema.json``. Comments at the
+    beginning list the fields that differ from their defaults. Text editors use the
     schema to check and complete fields. With the copy, they find the schema even after
-    the directory was moved.
+    the directory was moved. The folder ``own_code`` has the user's own laws and blocks.
+
+    Args:
+        scenario: The scenario.
+        directory: Existing directory.
+        relative: Whether paths of sound files start in the directory. Otherwise, they
+            are absolute.
     """
+    from diagrams.scenario.differences import differences_text
+    from diagrams.scenario.own_sources import write_own_sources
+
+    robots = scenario.robots.values()
+    write_own_sources((name for own in robots for name in own.own_code), directory)
+    data = scenario.model_dump(mode="json")
+    if relative:
+        _change_sound(data, lambda file: os.path.relpath(file, directory))
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
-    (directory / SCENARIO_FILE).write_text(first + dump_scenario(scenario), "utf-8")
+    text = first + differences_text(scenario) + dump_yaml(data)
+    (directory / SCENARIO_FILE).write_text(text, "utf-8")
     shutil.copyfile(SCHEMA_FILE, directory / SCHEMA_FILE.name)
 
 
@@ -159,7 +179,14 @@ def _find(source: str | Path) -> Path:
     known = "a name that 'phonotaxis scenarios' lists"
     if str(source) and path.is_dir():
         if (path / SCENARIO_FILE).is_file():
+            _require_one_run(path)
             return path / SCENARIO_FILE
+        for below in sorted(path.glob(f"*/{SCENARIO_FILE}")):
+            raise InputError(
+                "scenario",
+                f"{source} has the runs of several laws; choose one, for example "
+                f"phonotaxis simulate {below.parent}",
+            )
         raise InputError(
             "scenario",
             f"the directory {source} has no {SCENARIO_FILE}; use a result directory, "
@@ -169,10 +196,14 @@ def _find(source: str | Path) -> Path:
         if path.is_file():
             return path
         raise InputError(
-            "scenario", f"there is no file {source}; check the path, or use {known}"
+            "scenario",
+            f"there is no file {source}; check the path, or use {known}"
+            f"{did_you_mean(path.stem, library)}",
         )
     hint = did_you_mean(str(source), library)
-    if "=" in str(source):
+    if str(source) and Path(f"{source}.yaml").is_file():
+        hint = f" (did you mean '{source}.yaml'?)"
+    elif "=" in str(source):
         hint = f"; to set a field, write --set {source}"
     elif str(source) in known_laws():
         hint = "; laws are listed with commas and without spaces, as in --law a,b"
@@ -180,6 +211,22 @@ def _find(source: str | Path) -> Path:
         "scenario",
         f"{str(source)!r} is not known; use {known}, or the path of a .yaml file{hint}",
     )
+
+
+def _require_one_run(path: Path) -> None:
+    """Rejects result directories whose scenario is not that of a run."""
+    if (path / "sweep.yaml").is_file():
+        raise InputError(
+            "scenario",
+            f"{path} has the runs of a sweep; its report.html lists commands that "
+            f"repeat runs, and {path / SCENARIO_FILE} is the scenario without changes",
+        )
+    if (path / "recommended.yaml").is_file():
+        raise InputError(
+            "scenario",
+            f"{path} is a result of design; choose phonotaxis simulate "
+            f"{path / 'recommended.yaml'} or {path / SCENARIO_FILE}",
+        )
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
@@ -211,6 +258,11 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
         folder: Folder to which the relative paths refer: the folder of the scenario
             file, or the working directory.
     """
+    _change_sound(data, lambda file: str((folder / file).resolve()))
+
+
+def _change_sound(data: dict[str, Any], change: Callable[[str], str]) -> None:
+    """Changes the paths of all sound files in the fields of a scenario."""
     for place in [
         data,
         *_participants(data, "robots").values(),
@@ -223,7 +275,7 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
         ):
             fields = place.get(group)
             if isinstance(fields, dict) and isinstance(fields.get(key), str):
-                fields[key] = str((folder / fields[key]).resolve())
+                fields[key] = change(fields[key])
 
 
 def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]:

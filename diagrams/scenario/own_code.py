@@ -11,7 +11,7 @@ import ast
 import hashlib
 import importlib
 import importlib.util
-import inspect
+import re
 import signal
 import sys
 import traceback
@@ -24,14 +24,17 @@ from typing import TYPE_CHECKING, Any
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
-    from diagrams.scenario.scenario import Scenario
+    pass
+
+#: Names of objects that exist only in one process.
+_IN_MEMORY = re.compile(r"memory_[0-9a-f]{12}:")
 
 #: Packages of the project.
 OURS = ("analysis", "diagrams", "phonotaxis", "systems")
 
-#: Loaded modules of the user, with the SHA-256 of their files, by name of the module.
-_LOADED: dict[str, tuple[ModuleType, str]] = {}
-#: Whether loaded modules remain in use after a change, see ``code_of_sweep``.
+#: Loaded modules of the user, with the contents of their files, by name of the module.
+_LOADED: dict[str, tuple[ModuleType, bytes]] = {}
+#: Whether loaded modules remain in use after a change, see ``pinned_code``.
 _KEEPS = False
 
 
@@ -64,6 +67,12 @@ def import_own(name: str, field: str) -> Any:
     except BaseException as error:  # a user's module may raise any exception
         if is_interrupt(error):
             raise
+        if is_in_memory(name):
+            raise InputError(
+                field,
+                f"{name!r} was an object of another process; copy it from own_code in "
+                f"the result directory to my_laws.py and give 'my_laws.py:{attribute}'",
+            ) from None
         raise InputError(field, f"{name!r} cannot be imported: {why(error)}") from None
     if not callable(found):
         raise InputError(
@@ -71,6 +80,11 @@ def import_own(name: str, field: str) -> Any:
             f"{module_name} has no function or class {attribute!r}; check the name",
         )
     return found
+
+
+def is_in_memory(name: str) -> bool:
+    """Whether a law or a block is an object of one process, see ``name_of``."""
+    return _IN_MEMORY.match(name) is not None
 
 
 def _import(name: str) -> ModuleType:
@@ -110,20 +124,20 @@ def _module_of(name: str) -> ModuleType:
 
 def _has_changed(module: ModuleType) -> bool:
     """Whether a module's file has changed since loading. Records a new module."""
-    digest = _digest(Path(_file_of(module)))
-    known, loaded = _LOADED.get(module.__name__, (None, ""))
+    text = _contents(_file_of(module))
+    known, loaded = _LOADED.get(module.__name__, (None, b""))
     if known is not module:
-        _LOADED[module.__name__] = module, digest
+        _LOADED[module.__name__] = module, text
         return False
-    return digest != loaded
+    return text != loaded
 
 
-def _digest(file: Path) -> str:
-    """SHA-256 of a file; empty if the file is gone."""
+def _contents(file: str) -> bytes:
+    """Contents of a file; empty if the file is gone."""
     try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
+        return Path(file).read_bytes()
     except OSError:
-        return ""
+        return b""
 
 
 def _forget(changed: Sequence[ModuleType]) -> None:
@@ -143,61 +157,21 @@ def _forget(changed: Sequence[ModuleType]) -> None:
     importlib.invalidate_caches()
 
 
-def loaded_digests(scenario: Scenario) -> dict[str, str]:
-    """Returns digests of a user's own laws and blocks, to identify their versions.
-
-    Args:
-        scenario: Any scenario. The function ignores laws and blocks of the package.
-
-    Returns:
-        SHA-256 of each file of the user that the robots use, by absolute path. If a
-        file has changed since Python loaded it, the digest is that of the loaded
-        version.
-
-    Raises:
-        InputError: A law or block cannot be imported, see ``import_own``.
-    """
-    digests: dict[str, str] = {}
-    for robot in scenario.robots.values():
-        names = [(robot.law, "law"), *((block, "blocks") for block in robot.blocks)]
-        for name, field in names:
-            if ":" in name:
-                import_own(name, field)
-                digests |= digests_of(_module_of(name.rpartition(":")[0]))
-    return digests
-
-
 @contextmanager
-def code_of_sweep(scenario: Scenario, wanted: Mapping[str, str]) -> Iterator[None]:
-    """Ensures that a scenario runs with the user's code from the start of a sweep.
-
-    A sweep is a series of runs. Within the context, a changed file is not loaded again
-    if all loaded code is from the start of the sweep.
+def pinned_code(wanted: Mapping[str, str]) -> Iterator[None]:
+    """Keeps loaded modules in use after a change, if they have the wanted versions.
 
     Args:
-        scenario: The scenario to run.
-        wanted: SHA-256 of each file at the start of the sweep, by absolute path.
+        wanted: SHA-256 of files, by absolute path. Without files, nothing is kept.
 
     Yields:
         Nothing.
-
-    Raises:
-        InputError: A user's file has changed, and this process has not loaded the
-            version from the start of the sweep.
     """
     global _KEEPS  # noqa: PLW0603
-    loaded = {_file_of(module): digest for module, digest in _LOADED.values()}
+    loaded = {_file_of(module): _digest(text) for module, text in _LOADED.values()}
     kept = [wanted.get(file, digest) == digest for file, digest in loaded.items()]
     _KEEPS = bool(wanted) and all(kept)
     try:
-        own_law = any(":" in robot.law for robot in scenario.robots.values())
-        for file, digest in loaded_digests(scenario).items():
-            if wanted.get(file, digest) != digest:
-                raise InputError(
-                    "law" if own_law else "blocks",
-                    f"{file} has changed since the sweep began; restore it, or begin a "
-                    "new sweep",
-                )
         yield
     finally:
         _KEEPS = False
@@ -226,11 +200,49 @@ def digests_of(module: ModuleType) -> dict[str, str]:
     The result is the SHA-256 of the loaded version of each file, by absolute path. It
     is empty if none of the files belongs to the user.
     """
-    digests: dict[str, str] = {}
+    return {file: _digest(text) for file, text in _loaded_files(module).items()}
+
+
+def _loaded_files(module: ModuleType) -> dict[str, bytes]:
+    files: dict[str, bytes] = {}
     for each in _users_modules(module):
         _has_changed(each)  # records a new module
-        digests[_file_of(each)] = _LOADED[each.__name__][1]
-    return digests
+        files[_file_of(each)] = _LOADED[each.__name__][1]
+    return files
+
+
+def loaded_files(name: str) -> dict[str, bytes]:
+    """Returns the files of a user's law or block, as they were when Python loaded them.
+
+    Args:
+        name: Name of a law or a block.
+
+    Returns:
+        Contents of the files of its module, and of the user's modules that it uses, by
+        absolute path. There are none if the name belongs to the package, or if its
+        module is not loaded.
+    """
+    if ":" not in name:
+        return {}
+    try:
+        return _loaded_files(_module_of(name.rpartition(":")[0]))
+    except BaseException as error:  # a user's module may raise any exception
+        if is_interrupt(error):
+            raise
+        return {}
+
+
+def present_files(module: ModuleType) -> dict[str, str]:
+    """Returns digests of the present contents of the user's files of a module.
+
+    The result is the SHA-256 by absolute path, like that of ``digests_of``.
+    """
+    files = map(_file_of, _users_modules(module))
+    return {file: _digest(_contents(file)) for file in files}
+
+
+def _digest(text: bytes) -> str:
+    return hashlib.sha256(text).hexdigest()
 
 
 def _imports(file: Path, package: str) -> list[str]:
@@ -280,60 +292,6 @@ def _users_modules(module: ModuleType) -> list[ModuleType]:
     return [*found.values()]
 
 
-def made(name: str, field: str, maker: type, parts: Mapping[str, Any]) -> Any:
-    """Makes an object from a user's class, with the arguments that the class accepts.
-
-    Args:
-        name: Name of the class, for messages.
-        field: Field of the scenario that contains the name, for messages.
-        maker: The class. If it is a scalar-templated class of Drake, the signature of
-            its ``_construct`` counts.
-        parts: Values of the available arguments, by name of the argument.
-
-    Returns:
-        The object.
-
-    Raises:
-        InputError: The object cannot be made.
-    """
-    try:
-        return maker(**asked_for(maker, parts))
-    except BaseException as error:  # a user's class may raise any exception
-        if is_interrupt(error):
-            raise
-        raise InputError(
-            field,
-            f"{name!r} cannot be made ({why(error)}); it may take {', '.join(parts)}",
-        ) from error
-
-
-def asked_for(maker: type, parts: Mapping[str, Any]) -> dict[str, Any]:
-    """Selects the arguments that a class accepts, by the signature of its constructor.
-
-    A constructor with ``**kwargs`` passes keywords on to its base class. The function
-    then also considers the constructor of the base class. If all base classes have
-    ``**kwargs``, the class accepts all arguments.
-
-    Args:
-        maker: The class, see ``made``.
-        parts: Values of the available arguments, by name of the argument.
-
-    Returns:
-        The accepted arguments.
-    """
-    asked: set[str] = set()
-    any_keyword = False
-    for each in maker.__mro__:
-        construct = vars(each).get("_construct") or vars(each).get("__init__")
-        if inspect.isfunction(construct):
-            signature = inspect.signature(construct).parameters.values()
-            asked.update(own.name for own in signature)
-            any_keyword = any(own.kind is own.VAR_KEYWORD for own in signature)
-            if not any_keyword:
-                break
-    return {key: parts[key] for key in parts if any_keyword or key in asked}
-
-
 def _is_users(module: ModuleType, file: str) -> bool:
     """Whether a module belongs to the user, and not to an installed package."""
     # The running script cannot be loaded again.
@@ -367,8 +325,9 @@ def is_interrupt(error: BaseException) -> bool:
 def why(error: BaseException) -> str:
     """Returns the kind, text and line of an error in a user's code."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = Path(__file__).resolve().parents[1]
-    own = [f for f in frames if ours not in Path(f.filename).resolve().parents]
+    home = Path(__file__).resolve().parents[2]
+    ours = {home / name for name in OURS}
+    own = [f for f in frames if ours.isdisjoint(Path(f.filename).resolve().parents)]
     own = [f for f in own if "importlib" not in f.filename]
     at = f" in line {own[-1].lineno} of {Path(own[-1].filename).name}" if own else ""
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -55,6 +55,9 @@ from systems.safety.parameters import GuardParameters
 from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 
+#: Value of an argument of a user's own law or block.
+OwnGain = Annotated[float, Field(ge=-1e12, le=1e12)]
+
 #: Law of a robot that states none.
 DEFAULT_LAW = "active"
 
@@ -123,6 +126,9 @@ class Robot(Parameters):
     """Names of a user's own blocks, as ``package.module:Name`` or
     ``path/to/file.py:Name``. Each block replaces the robot's block with the same part
     (role). A block with a new part is added."""
+    own_gains: dict[str, OwnGain] = Field(default={})
+    """Gains of a user's own law and blocks, by name. A gain is an argument with a
+    number as its default: ``law(c, s, push_n=14.0)`` has the gain ``push_n``."""
     loudspeaker: SoundParameters | None = None
     """Sound that the robot itself plays at the origin of B, so that other robots can
     follow the robot. Its fields and defaults are those of ``sound``."""
@@ -134,6 +140,13 @@ class Robot(Parameters):
     plant: PlantParameters = PlantParameters()
     faults: Faults = ()
     """Sensors that fail during a run."""
+
+    @field_validator("law", "blocks", mode="before")
+    @classmethod
+    def _name_objects(cls, value: Any) -> Any:
+        from diagrams.scenario.own_objects import with_names
+
+        return with_names(value)
 
     @field_validator("law")
     @classmethod
@@ -155,6 +168,12 @@ class Robot(Parameters):
         for sensor, count in known.items():
             faults_of(self.faults, sensor, count)
         return self
+
+    @property
+    def own_code(self) -> dict[str, str]:
+        """Field of each law and block that is a user's own, by name."""
+        named = [(self.law, "law"), *((block, "blocks") for block in self.blocks)]
+        return {name: field for name, field in named if ":" in name}
 
     @property
     def sensor_counts(self) -> dict[FaultySensor, int]:

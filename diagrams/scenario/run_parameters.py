@@ -9,6 +9,7 @@ from pydantic import Field, Strict
 from systems.framework.parameters import (
     Duration,
     Length,
+    Line,
     Parameters,
     Period,
     Size,
@@ -55,9 +56,9 @@ class StopParameters(Parameters):
 class RunParameters(Parameters):
     """Fields of a run that do not belong to one robot, such as seed and obstacles."""
 
-    name: str = Field(default="default", min_length=1, pattern=r"^[^\n]*$")
+    name: Line = Field(default="default", min_length=1)
     """Name in the results."""
-    description: str = Field(default="", pattern=r"^[^\n]*$")
+    description: Line = ""
     """One line for the list of ``phonotaxis scenarios``."""
     engine: Literal["drake", "compiled", "auto"] = "auto"
     """``drake``: Drake's simulator; ``compiled``: one compiled loop over the same
@@ -73,7 +74,7 @@ class RunParameters(Parameters):
     arena_m: Size = (7.0, 7.0)
     """Extents of the floor in pictures, m; the arena has no walls."""
     obstacles: Annotated[
-        tuple[ObstacleParameters, ...], Strict(False), Field(max_length=100)
+        tuple[ObstacleParameters, ...], Strict(False), Field(max_length=1_000)
     ] = ()
     stop: StopParameters = StopParameters()
     sound_speed_m_s: SoundSpeed = SOUND_SPEED_M_S

@@ -31,7 +31,7 @@ from diagrams.scenario.bodies import (
     microphones_W,
     robot_rectangle,
 )
-from diagrams.scenario.checks.goal_checks import check_goals
+from diagrams.scenario.checks.goal_checks import check_filled_goals, check_goals
 from diagrams.scenario.checks.guard_checks import check_guard
 from diagrams.scenario.checks.search_checks import check_searches
 from diagrams.scenario.fields.explain import explain
@@ -64,6 +64,7 @@ from systems.odor.parameters import CONTAINER_M
 from systems.sound.parameters import SoundParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
+from systems.world.shapes import box
 
 #: Name of the target of a robot with a route.
 GOAL = "goal"
@@ -329,18 +330,19 @@ class Scenario(RunParameters):
         """
         robot = robot or next(iter(self.robots))
         target, paths = self.target(robot), paths or {}
-        bodies = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
+        bodies = {o.name: Body(o.path(), o.shape()) for o in self.obstacles}
         for name, other in self.robots.items():
             if name != robot:
                 start = RecordedPath(np.zeros(1), np.array([other.start.pose]))
                 path = paths.get(name) or start
-                bodies[name] = Body(path, other.size)
+                bodies[name] = Body(path, box(other.size))
         for name, source in self.sources.items():
             if source.body:
-                bodies[name] = Body(source.path(), (source.length_m, source.width_m))
+                shape = box((source.length_m, source.width_m))
+                bodies[name] = Body(source.path(), shape)
         if self.odor is not None:
             still = WaypointPath((self.odor.position_m,), speed=0.0)
-            bodies[ODOR] = Body(still, CONTAINER_M)
+            bodies[ODOR] = Body(still, box(CONTAINER_M))
         own = self.robots[robot]
         if isinstance(own, Router):
             goal = WaypointPath((own.route.goal_m,), speed=0.0)
@@ -358,13 +360,13 @@ class Scenario(RunParameters):
         return tuple(number for number, name in names if name in self.robots)
 
     def mapped(self) -> NDArray[np.float64]:
-        """(n, 5) rectangles of the known obstacles at rest, m and rad."""
+        """(n, 6) rectangles of the known obstacles at rest, m and rad."""
         still = [
-            Body(obstacle.path(), obstacle.size_m).rectangle(0.0)
+            Body(obstacle.path(), obstacle.shape()).rectangles(0.0)
             for obstacle in self.obstacles
             if obstacle.known and not obstacle.path().moves
         ]
-        return np.reshape(still, (-1, 5))
+        return np.concatenate([np.empty((0, 6)), *still])
 
     @property
     def believed_sound_speed_m_s(self) -> float:
@@ -411,6 +413,7 @@ class Scenario(RunParameters):
         faults = []
         for check in (
             lambda: check_goals(self.robots, self.stop.diverged_range_m),
+            lambda: check_filled_goals(self.robots, self.obstacles),
             self._check_rates,
             self._check_step,
             self._check_room,
@@ -564,15 +567,16 @@ class Scenario(RunParameters):
                     f"robot {second!r} at {self.robots[second].start.position_m} "
                     f"overlaps robot {first!r}; move one of them",
                 )
-        still = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
+        still = {o.name: Body(o.path(), o.shape()) for o in self.obstacles}
         fields = [f"obstacles.{k}" for k in range(len(self.obstacles))]
         for name, source in self.sources.items():
             if source.body:
-                still[name] = Body(source.path(), (source.length_m, source.width_m))
+                shape = box((source.length_m, source.width_m))
+                still[name] = Body(source.path(), shape)
                 fields.append(f"sources.{name}")
         for robot, footprint in footprints.items():
             for field, (name, body) in zip(fields, still.items(), strict=True):
-                if rectangle_clearance(footprint, body.rectangle(0.0)) < 0.0:
+                if body.clearance(footprint, 0.0) < 0.0:
                     raise InputError(
                         field,
                         f"{name!r} is on the robot's start at "

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from diagrams.scenario.own_code import import_own
+from diagrams.scenario.own_gains import check_own_gains
 from diagrams.scenario.participants import HasMicrophones
 from diagrams.scenario.shorthand import field_in
 from systems.framework.input_error import InputError
@@ -43,9 +44,8 @@ def check_files(scenario: Scenario) -> None:
 
             field = field_in("robots", name, "microphones.ego_noise_file")
             check(read_noise, ears.ego_noise_file, len(own.robot.microphones_m), field)
-        if ":" in own.law:
-            check(import_own, own.law, field_in("robots", name, "law"))
-        for block in own.blocks:
-            check(import_own, block, field_in("robots", name, "blocks"))
+        for code, field in own.own_code.items():
+            check(import_own, code, field_in("robots", name, field))
+        check(check_own_gains, own, field_in("robots", name, ""))
     if faults:
         raise InputError.joined(faults)

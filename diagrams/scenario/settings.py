@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -28,7 +29,7 @@ def plain_settings(
         InputError: A text does not have the form path=value, or a value is not plain.
     """
     if isinstance(overrides, Mapping):
-        return [(key, _plain(key, value)) for key, value in overrides.items()]
+        return [(_dotted(key), _plain(key, value)) for key, value in overrides.items()]
     if isinstance(overrides, str):
         raise InputError(
             "overrides", f"is the text {overrides!r}; give a list of key=value"
@@ -57,13 +58,22 @@ def all_settings(
 def _plain(key: str, value: Any) -> Any:
     """Returns a copy of the value as plain data, in the form of a file."""
     try:
-        return json.loads(json.dumps(value))
+        return json.loads(json.dumps(value, default=_named))
     except (TypeError, ValueError):
         raise InputError(
             key,
             f"{value!r} is not a plain value; give a number, a text, a truth "
-            "value, or a list or mapping of them",
+            "value, a list or mapping of them, or for a law or block of your own its "
+            "function or class",
         ) from None
+
+
+def _named(value: Any) -> str:
+    if not callable(value):
+        raise TypeError
+    from diagrams.scenario.own_objects import name_of
+
+    return name_of(value)
 
 
 def parse_setting(text: str) -> tuple[str, Any]:
@@ -73,10 +83,15 @@ def parse_setting(text: str) -> tuple[str, Any]:
     """
     key, equals, value_text = text.partition("=")
     if not equals or not all(key.split(".")):
-        raise InputError(
-            text or "--set", "is not of the form key=value, for example seed=2"
-        )
-    return key, parse_yaml(value_text, key)
+        key, _, value = re.sub(r"\s*:\s*", "=", text, count=1).partition("=")
+        remedy = f"write {key or 'seed'}={value or 'VALUE'}"
+        raise InputError(text or "--set", f"is not of the form key=value; {remedy}")
+    return _dotted(key), parse_yaml(value_text, key)
+
+
+def _dotted(key: str) -> str:
+    """Replaces indices in brackets: ``obstacles[0]`` is ``obstacles.0``."""
+    return re.sub(r"\[(\d+)\]", r".\1", key)
 
 
 def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:

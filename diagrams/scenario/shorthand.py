@@ -95,7 +95,9 @@ def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
         robots = _robots(robots, shared, sound)
         run["robots"] = robots
     if not isinstance(source, Mapping) or not isinstance(sound, Mapping):
-        return run | {"sources": {SOURCE: {**_group(source), "sound": sound}}}
+        if isinstance(source, Mapping):
+            source = {**source, "sound": sound}
+        return run | {"sources": {SOURCE: source}}
     base = joined({"sound": sound}, source)
     sources = run.get("sources") or {}
     if isinstance(robots, Mapping) and not sources:

@@ -19,7 +19,7 @@ from ruamel.yaml.parser import Parser
 from systems.framework.input_error import InputError
 
 #: Largest text, bytes; the parser takes some seconds for a text of this size.
-LARGEST_BYTES = 100_000
+LARGEST_BYTES = 300_000
 #: Largest number of levels.
 DEEPEST = 20
 #: Largest number of characters after the expansion of all aliases. Without this
@@ -38,7 +38,7 @@ def parse_yaml(text: str | bytes, field: str) -> Any:
         Mappings, lists and scalars. The result is None for an empty text.
 
     Raises:
-        InputError: The text is not YAML, or is longer than 100 kB.
+        InputError: The text is not YAML, or is longer than 300 kB.
         InputError: The text has more than 20 levels.
         InputError: Aliases expand the text to more than a million characters.
     """

@@ -11,7 +11,7 @@ from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 _DOCS = Path(__file__).resolve().parents[1]
 _PAGES = _DOCS / "reference"
-_PACKAGES = ("phonotaxis", "systems", "diagrams")
+_PACKAGES = ("phonotaxis", "phonotaxis.testing", "systems", "diagrams")
 
 
 def setup(app: Any) -> dict[str, bool]:

@@ -7,7 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from phonotaxis.commands.arguments import say, take_output
+from phonotaxis.commands.arguments import (
+    say,
+    take_output,
+    take_seed,
+    whole_seed,
+)
 from phonotaxis.commands.command import Command, Take
 from phonotaxis.result import Prepared, Result
 
@@ -28,7 +33,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
         default=100,
         help="measurements per cell (100)",
     )
-    parser.add_argument("--seed", metavar="N", help="seed of all random numbers")
+    take_seed(parser)
     parser.add_argument(
         "--tolerances",
         action="store_true",
@@ -43,7 +48,8 @@ def _prepare(options: Namespace, take: Take) -> Prepared[AccuracyResult]:
     from diagrams.scenario.loading import load_scenario
 
     take(options.out)
-    overrides = [] if options.seed is None else [f"seed={options.seed}"]
+    seed = whole_seed(options, None)
+    overrides = [] if seed is None else [f"seed={seed}"]
     load_scenario("default", overrides)
     check_trials(options.trials)
     say("measuring how well the robot locates sounds")

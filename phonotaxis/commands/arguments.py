@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from phonotaxis.run_files import CSV_FILE, MCAP_FILE
+
+if TYPE_CHECKING:
+    from phonotaxis.commands.command import Take
+
+Default = TypeVar("Default", int, None)
 
 #: Help text of law arguments. The text does not list the laws, because loading their
 #: names takes seconds.
@@ -51,36 +55,134 @@ def take_laws(parser: ArgumentParser, about: str) -> None:
     completed_by(law, LAW_WORDS)
 
 
-def take_json(parser: ArgumentParser) -> None:
+def law_of(options: Namespace) -> list[str]:
+    """Lists the setting of the law that the user has named.
+
+    Args:
+        options: Parsed options of the command line.
+
+    Returns:
+        One text ``law=NAME``; nothing if the user has named no law.
+
+    Raises:
+        InputError: There are several laws.
+    """
+    from diagrams.scenario.suggestions import law_names
+
+    names = law_names(options.law)
+    if len(names) > 1 or names == ["all"]:
+        from systems.framework.input_error import InputError
+
+        text = f"is {', '.join(names)}; this command takes one law at a time"
+        raise InputError("law", text)
+    return [f"law={name}" for name in names]
+
+
+def take_seed(
+    parser: ArgumentParser, about: str = "seed of all random numbers"
+) -> None:
+    """Adds the option ``--seed``; ``whole_seed`` reads it."""
+    parser.add_argument("--seed", metavar="N", help=about)
+
+
+def whole_seed(options: Namespace, default: Default) -> int | Default:
+    """Reads the seed that the user has given.
+
+    Args:
+        options: Parsed options of the command line.
+        default: Result if the user has given no seed.
+
+    Returns:
+        The seed.
+
+    Raises:
+        InputError: The text is not a whole number from 0 on.
+    """
+    if options.seed is None:
+        return default
+    if not options.seed.isdecimal():
+        from systems.framework.input_error import InputError
+
+        text = f"{options.seed!r} is not a whole number; give 0 or more"
+        raise InputError("seed", text)
+    return int(options.seed)
+
+
+def take_json(parser: ArgumentParser, about: str = "print one JSON document") -> None:
     """Adds the option ``--json``."""
-    parser.add_argument("--json", action="store_true", help="print one JSON document")
+    parser.add_argument("--json", action="store_true", help=about)
 
 
-def take_output(parser: ArgumentParser) -> None:
-    """Adds the options ``--out`` and ``--json``."""
-    out = parser.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    completed_by(out, "directory")
-    take_json(parser)
+def take_output(
+    parser: ArgumentParser, about: str = "result directory (default: results/NUMBER)"
+) -> None:
+    """Adds the options ``--out``, ``--figures`` and ``--json``.
 
-
-def take_figures(parser: ArgumentParser) -> None:
-    """Adds the option ``--figures``."""
+    Args:
+        parser: Parser of a command with a result that can be drawn.
+        about: Meaning of ``--out``.
+    """
+    take_out(parser, about)
     parser.add_argument(
         "--figures",
         action="store_true",
-        help="write figures of rates and metrics as PDF, SVG and PNG files, for papers",
+        help="write the figures as PDF, SVG and PNG files, too, for papers",
+    )
+    take_json(parser)
+
+
+def take_out(parser: ArgumentParser, about: str) -> None:
+    """Adds the option ``--out``."""
+    out = parser.add_argument("--out", metavar="DIR", help=about)
+    completed_by(out, "directory")
+
+
+def take_wanted_place(options: Namespace, take: Take) -> None:
+    """Takes a result directory if the user names one; without it, nothing is written.
+
+    Args:
+        options: Parsed options of the command line.
+        take: Function that reserves the directory.
+
+    Raises:
+        InputError: Figures are wanted, and there is no directory for them.
+    """
+    if options.out is not None:
+        take(options.out)
+    elif options.figures:
+        from systems.framework.input_error import InputError
+
+        raise InputError("figures", "need a directory; add --out DIR")
+
+
+def take_batch(parser: ArgumentParser, runs: str) -> None:
+    """Adds the options of many runs: ``--runs``, ``--workers`` and ``--resume``.
+
+    Args:
+        parser: Parser of a command.
+        runs: Meaning of ``--runs``.
+    """
+    take_runs(parser, runs)
+    take_workers(parser)
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="continue with the runs in --out; with more --runs, add runs",
     )
 
 
-def write_batch_files(
-    options: Namespace, result: Any, document: dict[str, Any], directory: Path
+def take_runs(parser: ArgumentParser, about: str, default: int | None = None) -> None:
+    """Adds the option ``--runs``."""
+    parser.add_argument("--runs", metavar="N", type=int, default=default, help=about)
+
+
+def take_workers(
+    parser: ArgumentParser,
+    about: str = "local processes (default: one per core)",
+    default: int | None = None,
 ) -> None:
-    """Writes the files of a batch of runs; with ``--figures``, its figures, too."""
-    result.write(document, directory)
-    if options.figures:
-        result.save_figures(directory / "figures")
+    """Adds the option ``--workers``."""
+    parser.add_argument("--workers", metavar="N", type=int, default=default, help=about)
 
 
 def take_exports(parser: ArgumentParser) -> None:
@@ -109,11 +211,22 @@ def take_scenario(parser: ArgumentParser) -> None:
         "scenario", nargs="?", default="default", help="library name or YAML file"
     )
     completed_by(scenario, SCENARIO_WORDS)
-    parser.add_argument("--seed", metavar="N", help="seed of all random numbers")
+    take_seed(parser)
+    take_settings(parser)
+
+
+def take_settings(parser: ArgumentParser, velocity_terms: str = "") -> None:
+    """Adds the option ``--set``, and options for fields that users set often.
+
+    Args:
+        parser: Parser of a command.
+        velocity_terms: What several velocity terms mean; empty if there can be one.
+    """
     parser.add_argument(
         "--velocity-term",
         metavar="TERM",
-        help="printed (|dC/dt|) or closing (the speed of approach only)",
+        help=f"printed (|dC/dt|) or closing (the speed of approach only)"
+        f"{velocity_terms}",
     )
     parser.add_argument(
         "--guard",
@@ -130,23 +243,24 @@ def take_scenario(parser: ArgumentParser) -> None:
     )
 
 
-def overrides(options: Namespace) -> list[str]:
+def settings_of(options: Namespace) -> list[str]:
     """Lists the settings that the options make, as texts ``key=value``.
 
-    Options for a single field, for example ``--seed``, come last and override
+    Options for a single field, for example ``--guard``, come last and override
     ``--set``.
     """
     found = list(options.set)
-    for option, field in (
-        ("seed", "seed"),
-        ("velocity_term", "collision_vector.velocity_term"),
-    ):
-        value = getattr(options, option)
-        if value is not None:
-            found.append(f"{field}={value}")
+    if options.velocity_term is not None:
+        found.append(f"collision_vector.velocity_term={options.velocity_term}")
     if options.guard is not None:
         found.append("guard={}" if options.guard == "on" else "guard=null")
     return found
+
+
+def overrides(options: Namespace) -> list[str]:
+    """Lists the settings of one scenario: those of ``settings_of``, and the seed."""
+    seed = whole_seed(options, None)
+    return settings_of(options) + ([] if seed is None else [f"seed={seed}"])
 
 
 def say(text: str) -> None:

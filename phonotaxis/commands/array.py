@@ -5,7 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import completed_by, say, take_json
+from phonotaxis.commands.arguments import (
+    completed_by,
+    say,
+    take_output,
+    take_wanted_place,
+)
 from phonotaxis.commands.command import Command, Take
 
 if TYPE_CHECKING:
@@ -32,18 +37,14 @@ def _add_arguments(parser: ArgumentParser) -> None:
         default=0.5,
         help="duration of the sound (default: 0.5)",
     )
-    parser.add_argument(
-        "--out", metavar="DIR", help="directory for array.json and array.png"
-    )
-    take_json(parser)
+    take_output(parser, "directory for array.json and array.png (default: no files)")
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[ResolutionResult]:
     from analysis.arrays.array_geometry import load_geometry
 
     geometry = load_geometry(options.geometry)
-    if options.out is not None:
-        take(options.out)
+    take_wanted_place(options, take)
     say(f"predicting the errors of {options.geometry}")
 
     from phonotaxis.arrays import prepare_resolution

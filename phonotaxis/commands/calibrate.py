@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import say, take_json
+from phonotaxis.commands.arguments import say, take_output, take_wanted_place
 from phonotaxis.commands.command import Command, Take
 
 if TYPE_CHECKING:
@@ -22,10 +22,9 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--geometry", metavar="FILE.yaml", help="stated positions of the microphones"
     )
-    parser.add_argument(
-        "--out", metavar="DIR", help="directory for array.yaml and calibration.json"
+    take_output(
+        parser, "directory for array.yaml, calibration.json (default: no files)"
     )
-    take_json(parser)
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[CalibrationResult]:
@@ -35,8 +34,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[CalibrationResult]:
     sounds = load_calibration_sounds(options.sounds)
     given = options.geometry
     geometry = load_geometry(given) if given else ArrayGeometry()
-    if options.out is not None:
-        take(options.out)
+    take_wanted_place(options, take)
     say(f"calibrating by {options.sounds}")
 
     from phonotaxis.recordings import prepare_calibration

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from contextlib import ExitStack, nullcontext, redirect_stdout
+from contextlib import ExitStack, nullcontext, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +73,9 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
     except OSError as error:
         text = f"standard output cannot be written ({error.strerror}){where}"
         raise RunError(text) from error
+    if prepared.stay is not None:
+        with suppress(KeyboardInterrupt), interrupts.at_once():
+            prepared.stay()
     if (failure := result.failure(out)) is not None:
         raise failure
 
@@ -98,10 +101,17 @@ def _written(
     if place is None:
         if result.out is not None:
             command.write(options, result, document, result.out)
+            _write_figures(options, result, result.out)
         return document, result.out
     document = {**document, "out": str(place.out)}
     command.write(options, result, document, place.directory)
+    _write_figures(options, result, place.directory)
     return document, place.out
+
+
+def _write_figures(options: Namespace, result: Result, directory: Path) -> None:
+    if getattr(options, "figures", False):
+        result.save_figures(directory / "figures")
 
 
 def _print(
@@ -114,5 +124,6 @@ def _print(
 ) -> None:
     text = json.dumps(document, allow_nan=False) if as_json else str(result)
     if out is not None and not as_json:
-        text += f"\n{command.where.format(out=out)}"
+        where = (isinstance(result, Result) and result.where) or command.where
+        text += f"\n{where.format(out=out)}"
     print(text, flush=True)

@@ -25,6 +25,7 @@ from phonotaxis.commands import (
     design,
     export,
     falsify,
+    init,
     listen,
     lists,
     locate,
@@ -62,6 +63,7 @@ COMMANDS: dict[str, Command] = {
         design.COMMAND,
         falsify.COMMAND,
         export.COMMAND,
+        init.COMMAND,
         lists.COLUMNS,
         lists.DOCTOR,
         completion.COMMAND,
@@ -87,6 +89,11 @@ class _Parser(argparse.ArgumentParser):
         command = re.match(r"argument COMMAND: invalid choice: '(.*?)'", message)
         if command:
             raise _UsageError(no_command(command[1], COMMANDS))
+        if alone := re.match(r"argument (\S+): expected one argument", message):
+            message = f"{message}; write {_written(self, alone[1])}"
+        elif message.startswith("the following arguments are required"):
+            example = str(self.epilog).splitlines()[1].strip()
+            message = f"{message}; for example {example}"
         raise _UsageError(f"{message}; see {self.prog} --help")
 
     def refuse(
@@ -102,6 +109,16 @@ class _Parser(argparse.ArgumentParser):
         options = {name: _options(parser) for name, parser in self.below.items()}
         text = no_option(command, unknown, words, options)
         raise _UsageError(f"{text}; see {self.prog} {command} --help")
+
+
+def _written(parser: argparse.ArgumentParser, names: str) -> str:
+    """Returns an option with its value, for example ``--seed N``."""
+    for action in parser._actions:
+        if "/".join(action.option_strings) == names:
+            choices = "|".join(map(str, action.choices or ()))
+            value = choices or action.metavar or str(action.dest).upper()
+            return f"{action.option_strings[0]} {value}"
+    return names
 
 
 def _options(parser: argparse.ArgumentParser) -> list[str]:
@@ -256,6 +273,7 @@ def make_parser() -> _Parser:
     """Makes the parser of the whole command line."""
     parser = _Parser(
         prog="phonotaxis",
+        allow_abbrev=False,
         description="A robot that follows a sound.",
         epilog="examples:\n  phonotaxis simulate\n  phonotaxis fields room\n"
         "  phonotaxis COMMAND --help",
@@ -270,6 +288,7 @@ def make_parser() -> _Parser:
         subparser = subparsers.add_parser(
             command.name,
             help=command.help,
+            allow_abbrev=False,
             epilog="\n".join(["examples:", *lines]),
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

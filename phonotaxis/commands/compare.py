@@ -9,10 +9,13 @@ from phonotaxis.commands.arguments import (
     SCENARIO_WORDS,
     completed_by,
     say,
-    take_figures,
+    settings_of,
+    take_batch,
     take_laws,
     take_output,
-    write_batch_files,
+    take_seed,
+    take_settings,
+    whole_seed,
 )
 from phonotaxis.commands.command import Command, Take
 
@@ -34,22 +37,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
         "all: every law for robots of this kind (default: the papers' laws and none; "
         "for routes the laws of routes)",
     )
-    parser.add_argument(
-        "--velocity-term",
-        metavar="TERM,...",
-        help="printed, closing, or both (default: as in the scenario)",
-    )
-    parser.add_argument(
-        "--runs", metavar="N", type=int, default=50, help="layouts per scenario (50)"
-    )
-    parser.add_argument("--seed", metavar="N", help="seed of layouts and noise (1)")
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        help="set any field, for example hearing=ideal; may be repeated",
-    )
+    take_seed(parser, "seed of layouts and noise (default: 1)")
+    take_settings(parser, "; with a comma, both are compared")
     parser.add_argument(
         "--grid",
         metavar="KEY=[VALUE,...]",
@@ -57,13 +46,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
         default=[],
         help="compare values of a further field, for example hearing=[audio,ideal]",
     )
-    parser.add_argument(
-        "--workers", metavar="N", type=int, help="processes (default: one per core)"
-    )
-    parser.add_argument(
-        "--resume", action="store_true", help="continue with the runs in --out"
-    )
-    take_figures(parser)
+    take_batch(parser, "layouts per scenario (default: 50)")
     take_output(parser)
 
 
@@ -75,10 +58,9 @@ def _prepare(options: Namespace, take: Take) -> Prepared[ComparisonResult]:
     plans = comparison_plans(
         options.scenario,
         laws=options.law or None,
-        velocity_terms=options.velocity_term,
-        runs=options.runs,
-        seed=options.seed,
-        settings=options.set,
+        runs=50 if options.runs is None else options.runs,
+        seed=whole_seed(options, 1),
+        settings=settings_of(options),
         grid=options.grid,
     )
     for plan in plans.values():
@@ -98,7 +80,6 @@ COMMAND = Command(
     _add_arguments,
     _prepare,
     where="\nresults in {out}, report in {out}/report.html",
-    write=write_batch_files,
     examples=(
         "compare two_static_obstacles --laws conventional,active --runs 20",
         "compare --set hearing=ideal --velocity-term printed,closing",

@@ -5,7 +5,14 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import overrides, say, take_output, take_scenario
+from phonotaxis.commands.arguments import (
+    law_of,
+    overrides,
+    say,
+    take_laws,
+    take_output,
+    take_scenario,
+)
 from phonotaxis.commands.command import Command, Take
 
 if TYPE_CHECKING:
@@ -14,6 +21,7 @@ if TYPE_CHECKING:
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
+    take_laws(parser, "one law (default: the scenario's law)")
     take_scenario(parser)
     take_output(parser)
 
@@ -23,7 +31,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[DesignResult]:
     from diagrams.scenario.scenario_files import check_files
 
     take(options.out)
-    scenario = load_scenario(options.scenario, overrides(options))
+    scenario = load_scenario(options.scenario, overrides(options) + law_of(options))
     check_files(scenario)
     say(f"designing gains for {scenario.name}")
 

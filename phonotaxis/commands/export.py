@@ -8,7 +8,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import require_exports, take_exports, take_json
+from phonotaxis.commands.arguments import (
+    require_exports,
+    take_exports,
+    take_json,
+    take_out,
+)
 from phonotaxis.commands.command import Command, Printed, Take
 from phonotaxis.result import Prepared
 from phonotaxis.run_files import CSV_FILE, MCAP_FILE
@@ -22,11 +27,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
         "result", metavar="DIR", help="result directory of phonotaxis simulate"
     )
     take_exports(parser)
-    parser.add_argument(
-        "--out",
-        metavar="DIR",
-        help="new directory for the files (default: the directory of the run)",
-    )
+    take_out(parser, "new directory for the files (default: the directory of the run)")
     take_json(parser)
 
 

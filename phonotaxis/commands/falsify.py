@@ -7,7 +7,14 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import say, take_json
+from phonotaxis.commands.arguments import (
+    say,
+    take_json,
+    take_runs,
+    take_seed,
+    take_workers,
+    whole_seed,
+)
 from phonotaxis.commands.command import Command, Printed, Take
 from phonotaxis.result import Prepared
 
@@ -16,9 +23,7 @@ if TYPE_CHECKING:
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--runs", metavar="N", type=int, default=2_000, help="random runs (2000)"
-    )
+    take_runs(parser, "random runs (default: 2000)", 2_000)
     parser.add_argument(
         "--search",
         metavar="N",
@@ -26,16 +31,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
         default=0,
         help="runs of the search for collisions (0)",
     )
-    parser.add_argument(
-        "--seed",
-        metavar="N",
-        type=int,
-        default=1,
-        help="seed of all random numbers (1)",
-    )
-    parser.add_argument(
-        "--workers", metavar="N", type=int, default=1, help="local processes (1)"
-    )
+    take_seed(parser, "seed of all random numbers (default: 1)")
+    take_workers(parser, "local processes (default: 1)", 1)
     parser.add_argument(
         "--drivers",
         metavar="NAME,...",
@@ -66,12 +63,12 @@ def _prepare(options: Namespace, take: Take) -> Prepared[Printed]:
     from systems.framework.input_error import InputError
 
     check_options(None, workers=options.workers)
-    for name in ("runs", "search", "seed", "only"):
+    for name in ("runs", "search", "only"):
         if (getattr(options, name) or 0) < 0:
             raise InputError(name, f"{getattr(options, name)} must not be negative")
     if options.runs + options.search == 0:
         raise InputError("runs", "is 0, and there is no search; give at least one run")
-    drivers = _drivers(options.drivers)
+    drivers, options.seed = _drivers(options.drivers), whole_seed(options, 1)
     say("trying to make the guard collide")
     if options.cost:
         return _cost()

@@ -9,33 +9,88 @@ _IN_RESULTS = (
     "every result directory holds its pictures and pages; 'phonotaxis results' lists "
     "these directories"
 )
-_CHECKED = "each command checks its input before it runs; see 'phonotaxis scenarios'"
-
+_NEW = (
+    "use 'phonotaxis init my_robot' for a project, or 'phonotaxis scenarios default "
+    "--copy my_scenario.yaml' for a scenario"
+)
+_REPLAY = f"{_IN_RESULTS}; open replay.html in a browser"
+_COPY = "use 'phonotaxis scenarios default --copy my_scenario.yaml'"
+_MANY = "use 'phonotaxis sweep SWEEP.yaml', or 'phonotaxis compare' for several laws"
+_GAINS = "use 'phonotaxis design' for gains, or 'phonotaxis sweep' for other fields"
+_LOOP = "use 'phonotaxis stability', which writes the linear models and all margins"
+_ABOUT = (
+    "use 'phonotaxis scenarios NAME', 'phonotaxis laws NAME' or 'phonotaxis fields'"
+)
+_PLAIN = (
+    "results are plain directories under results/; remove those that you do not need"
+)
+_PICTURES = (
+    "pictures are in the result directory; --figures writes them for papers, too"
+)
+_FIRST = "use 'phonotaxis simulate', which runs the default scenario"
+_PIP = "use pip; 'phonotaxis doctor' checks the installation"
+_CHECKED = "use 'phonotaxis scenarios FILE', which checks a file without a run"
 #: What to do instead of a command that does not exist. A text names the line to type.
 _NO_COMMANDS = {
     "plot": f"{_IN_RESULTS}, and 'phonotaxis simulate' writes a new one",
     "view": _IN_RESULTS,
     "open": _IN_RESULTS,
-    "replay": f"{_IN_RESULTS}; open replay.html in a browser",
+    **dict.fromkeys(
+        ("replay", "gui", "viz", "visualize", "visualise", "animate", "watch"), _REPLAY
+    ),
     "movie": "use 'phonotaxis simulate --movie FILE.mp4'",
     "report": f"{_IN_RESULTS}; open report.html in a browser",
-    "init": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
-    "new": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
-    "create": "use 'phonotaxis scenarios default --copy my_scenario.yaml'",
+    "new": _NEW,
+    "create": _NEW,
+    **dict.fromkeys(("edit", "copy"), _COPY),
+    **dict.fromkeys(("batch", "montecarlo", "monte-carlo", "grid"), _MANY),
+    **dict.fromkeys(("optimize", "optimise", "tune", "train", "fit"), _GAINS),
+    **dict.fromkeys(("margins", "bode", "nyquist", "poles", "equilibria"), _LOOP),
+    **dict.fromkeys(("info", "describe", "doc", "explain"), _ABOUT),
+    **dict.fromkeys(("delete", "clean", "remove", "rm"), _PLAIN),
+    **dict.fromkeys(("test", "demo", "quickstart"), _FIRST),
+    **dict.fromkeys(("install", "update", "upgrade"), _PIP),
+    "live": "use 'phonotaxis simulate --live' for a run, or 'phonotaxis listen'",
+    "ls": "use 'phonotaxis results' or 'phonotaxis scenarios'",
+    "log": "use 'phonotaxis results', which lists what is there",
+    "example": "'phonotaxis COMMAND --help' ends with examples",
+    "examples": "'phonotaxis COMMAND --help' ends with examples",
+    "set": "use 'phonotaxis simulate --set KEY=VALUE'",
     "validate": _CHECKED,
     "check": _CHECKED,
     "docs": "'phonotaxis COMMAND --help' describes a command; the folder docs has more",
-    "config": "use 'phonotaxis fields', which lists all settings",
-    "linearize": "use 'phonotaxis stability', which writes the linear models",
+    **dict.fromkeys(
+        ("config", "params", "parameters", "settings", "options"),
+        "use 'phonotaxis fields', which lists all settings",
+    ),
+    "linearize": _LOOP,
     "record": "use 'phonotaxis listen', or record a file and use 'phonotaxis locate'",
 }
 #: What to do instead of an option that does not exist in any command.
 _NO_OPTIONS = {
     "gui": "the result directory holds replay.html for a browser",
-    "plot": "pictures are in the result directory; see --no-plots",
+    "plot": _PICTURES,
+    "plots": _PICTURES,
+    "fast": "write --set engine=compiled",
+    "compiled": "write --set engine=compiled",
+    "ideal": "write --set hearing=ideal",
+    "no-noise": "write --set hearing=ideal",
+    "quiet": "--json prints one document, and 2>/dev/null hides the progress",
+    "silent": "--json prints one document, and 2>/dev/null hides the progress",
+    "dry-run": _CHECKED,
+    "headless": "no command opens a window; see 'phonotaxis results'",
+    "margins": "the report has all margins; see report.html",
+    "matlab": "the result directory has models.mat",
+    "latest": "results/latest is the last result directory",
+    "parquet": "the directory of a run has trajectory.parquet already",
+    "rosbag": "--mcap writes a file of ROS 2 messages",
     "verbose": "--debug prints the traceback of an error",
     "v": "--debug prints the traceback of an error; phonotaxis --version the version",
     "no-audio": "sound is written only with --save-audio DIR",
+    "ros": "--mcap writes a file of ROS 2 messages",
+    "last": "results/latest is the last result directory",
+    "validate": _CHECKED,
+    "check": _CHECKED,
     "realtime": "open replay.html of the result directory, which plays in real time",
     "list-devices": "'phonotaxis doctor' lists the sound cards",
 }
@@ -49,8 +104,42 @@ _OPTIONS = {
     "jobs": "workers",
     "processes": "workers",
     "trials": "runs",
+    "repeat": "runs",
+    "repeats": "runs",
+    "samples": "runs",
+    "n": "runs",
+    "runs": "trials",
+    "threads": "workers",
+    "parallel": "workers",
+    "cores": "workers",
+    "j": "workers",
+    "dask": "scheduler",
     "wav": "sound",
     "gains": "set",
+    "param": "set",
+    "params": "set",
+    "override": "set",
+    "D": "set",
+    "save": "out",
+    "o": "out",
+    "s": "seed",
+    "l": "law",
+    "controller": "law",
+    "law": "drivers",
+    "laws": "drivers",
+    "video": "movie",
+    "save-video": "movie",
+    "gif": "movie",
+    "mic": "device",
+    "mics": "geometry",
+    "microphones": "geometry",
+    "format": "csv",
+}
+#: Options whose value is a word without an option.
+_POSITIONAL = {
+    "scenario": "set",
+    "config": "set",
+    "file": "set",
 }
 
 
@@ -58,8 +147,10 @@ def meant_words(words: Sequence[str]) -> list[str]:
     """Replaces ``help`` and ``version`` by the options that they stand for."""
     if words[:1] == ["help"]:
         return [*words[1:2], "--help"]
-    if words[:1] == ["version"]:
+    if words[:1] in (["version"], ["-V"], ["-v"]):
         return ["--version"]
+    if words[:1] == ["--list"]:
+        return ["scenarios", *words[1:]]
     return list(words)
 
 
@@ -98,10 +189,12 @@ def no_option(
     own = options[command]
     found = re.match(r"--?([A-Za-z][\w-]*)(?:=(.*))?$", unknown[0])
     if found is None:
-        return f"{text}{_no_word(unknown[0], own)}"
+        return f"{text}{_no_word(command, unknown[0], own)}"
     name, value = found[1], found[2] or _next_word(words, unknown[0])
-    if name == "scenario" and "set" in own:
+    if name in _POSITIONAL and "set" in own:
         return f"{text}; write phonotaxis {command} {value or 'SCENARIO'}"
+    if (command, name) == ("array", "geometry"):
+        return f"{text}; write phonotaxis array {value or 'FILE.yaml'}"
     if name in _NO_OPTIONS:
         return f"{text}; {_NO_OPTIONS[name]}"
     hint = _of_field(name, value) if "set" in own else ""
@@ -114,9 +207,14 @@ def _next_word(words: Sequence[str], word: str) -> str:
     return "" if after[0].startswith("-") and not after[0][1:2].isdigit() else after[0]
 
 
-def _no_word(word: str, own: Collection[str]) -> str:
+def _no_word(command: str, word: str, own: Collection[str]) -> str:
+    """Returns what to do with a word too many that is not an option."""
     if "=" in word and "set" in own:
         return f"; write --set {word}"
+    if command == "results":
+        return f"; the page of a result is results/{word}/report.html"
+    if "set" in own:
+        return "; give one scenario, or several to 'phonotaxis compare'"
     return ""
 
 
@@ -145,8 +243,9 @@ def _of_option(
         return f" (did you mean '--{_OPTIONS[name]}'?)"
     from diagrams.scenario.suggestions import did_you_mean
 
+    if name in options:
+        return f"; {name} is a command: phonotaxis {name} --help"
+    if others := [each for each, known in options.items() if name in known]:
+        return f" (--{name} is an option of {', '.join(others)})"
     # The names have no dashes, which would make all options look similar.
-    if hint := did_you_mean(name, own).replace("'", "'--", 1):
-        return hint
-    others = [each for each, known in options.items() if name in known]
-    return f" (--{name} is an option of {', '.join(others)})" if others else ""
+    return did_you_mean(name, own).replace("'", "'--", 1)

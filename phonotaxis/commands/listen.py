@@ -7,6 +7,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, BinaryIO
 
+from phonotaxis.commands.arguments import take_json
 from phonotaxis.commands.command import Command, Take
 from phonotaxis.result import Prepared
 
@@ -44,11 +45,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
         metavar="N",
         help="channels of raw samples (default: as in the array)",
     )
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help="print one JSON line per source and step, and one at the end",
-    )
+    take_json(parser, "print one JSON line per source and step, and one at the end")
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[ListenResult]:

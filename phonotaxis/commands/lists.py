@@ -19,6 +19,7 @@ from phonotaxis.commands.arguments import (
     SCENARIO_WORDS,
     completed_by,
     take_json,
+    take_laws,
 )
 from phonotaxis.commands.command import Command, Printed, Take
 from phonotaxis.result import Prepared
@@ -56,13 +57,14 @@ def _scenarios(options: Namespace, take: Take) -> Prepared[Printed]:
 def _scenario(name: str | None, copy: str | None) -> Prepared[Printed]:
     """Prints or copies the file of one scenario."""
     from analysis.report.provenance import SCHEMA_VERSION
-    from diagrams.scenario.loading import scenario_text
+    from diagrams.scenario.loading import load_scenario, scenario_text
     from systems.framework.input_error import InputError
 
     if name is None:
         raise InputError(
             "name", f"is missing; write phonotaxis scenarios default --copy {copy}"
         )
+    load_scenario(name)  # refuses faults of a user's file
     # The schema lies elsewhere for a copy.
     text = re.sub(r"^# yaml-language-server.*\n", "", scenario_text(name))
     document = {"schema_version": SCHEMA_VERSION, "scenario": name, "text": text}
@@ -180,28 +182,20 @@ def _add_fields_arguments(parser: ArgumentParser) -> None:
         action="store_true",
         help="print the JSON Schema, for editors and other programs",
     )
-    parser.add_argument(
-        "--law",
-        metavar="NAME",
-        help="list only the fields of a robot with this law",
-    )
+    take_laws(parser, "lists only the fields of robots with these laws")
     take_json(parser)
 
 
 def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
     from analysis.report.provenance import SCHEMA_VERSION
-    from diagrams.scenario.fields.field_list import fields_of_law, find_fields
+    from diagrams.scenario.fields.field_list import find_fields
     from diagrams.scenario.fields.shipped import scenario_schema, schema_text
 
     schema = scenario_schema()
-    found = find_fields(schema, options.pattern)
-    if options.law is not None:
-        from diagrams.scenario.suggestions import unknown_law
-        from systems.laws.catalog import LAWS
-
-        if options.law not in LAWS:
-            raise unknown_law(options.law, LAWS)
-        found = fields_of_law(found, options.law, LAWS[options.law].robot)
+    own = _own_gains(options.law or [])
+    found = find_fields(schema, options.pattern, own)
+    if options.law:
+        found = _of_laws(options.law, found)
     if options.schema:
         return _printed(schema, schema_text().rstrip("\n"))
     listed = [asdict(field) for field in found]
@@ -209,6 +203,35 @@ def _fields(options: Namespace, take: Take) -> Prepared[Printed]:
         {"schema_version": SCHEMA_VERSION, "fields": listed},
         "\n".join(map(_paragraph, found)),
     )
+
+
+def _of_laws(given: list[str], fields: list[Field]) -> list[Field]:
+    """Returns the fields of robots that have one of the laws."""
+    from diagrams.scenario.fields.field_list import fields_of_law
+    from diagrams.scenario.suggestions import law_names, unknown_law
+    from systems.framework.input_error import InputError
+    from systems.laws.catalog import LAWS
+
+    names = law_names(given)
+    names = [*LAWS] if "all" in names else names
+    for law in names:
+        if law not in LAWS and ":" not in law:
+            raise InputError("law", unknown_law(law, LAWS).message)
+    kinds = {law: LAWS[law].robot if law in LAWS else "follower" for law in names}
+    own = [fields_of_law(fields, law, kind) for law, kind in kinds.items()]
+    return [field for field in fields if any(field in each for each in own)]
+
+
+def _own_gains(given: list[str]) -> list[Field]:
+    """Returns the gains of the user's own laws as fields."""
+    from diagrams.scenario.suggestions import law_names
+
+    laws = [law for law in law_names(given) if ":" in law] if given else []
+    if not laws:
+        return []
+    from diagrams.scenario.own_gains import gain_fields
+
+    return [field for law in laws for field in gain_fields(law)]
 
 
 def _paragraph(field: Field) -> str:
@@ -300,7 +323,7 @@ SCENARIOS = Command(
         "scenarios u_trap",
         "scenarios u_trap --copy my_scenario.yaml",
     ),
-    synonyms=("list", "show"),
+    synonyms=("list", "show", "scenario"),
 )
 LAWS = Command(
     "laws",
@@ -311,6 +334,7 @@ LAWS = Command(
         "laws",
         "laws active",
     ),
+    synonyms=("law",),
 )
 RESULTS = Command(
     "results",
@@ -328,6 +352,7 @@ FIELDS = Command(
         "fields room",
         "fields 'obstacles.*'",
         "fields --law active",
+        "fields --law my_laws.py:soft own_gains",
         "fields reverberation --json",
         "fields --schema > scenario.schema.json",
     ),

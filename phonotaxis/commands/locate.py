@@ -5,7 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from phonotaxis.commands.arguments import completed_by, say, take_json
+from phonotaxis.commands.arguments import (
+    completed_by,
+    say,
+    take_output,
+    take_wanted_place,
+)
 from phonotaxis.commands.command import Command, Take
 
 if TYPE_CHECKING:
@@ -29,10 +34,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--geometry", metavar="FILE.yaml", help="positions of the microphones"
     )
-    parser.add_argument(
-        "--out", metavar="DIR", help="directory for locate.json and locate.png"
-    )
-    take_json(parser)
+    take_output(parser, "directory for locate.json and locate.png (default: no files)")
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[LocateResult]:
@@ -42,8 +44,7 @@ def _prepare(options: Namespace, take: Take) -> Prepared[LocateResult]:
     geometry = make_geometry(options.geometry)
     starts_s = None if options.starts_s is None else _times(options.starts_s)
     recorded = recorded_samples(options.recording, geometry, starts_s=starts_s)
-    if options.out is not None:
-        take(options.out)
+    take_wanted_place(options, take)
     say(f"locating sources in {name_of_files(options.recording)}")
 
     from phonotaxis.recordings import prepare_locate

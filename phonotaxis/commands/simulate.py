@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,27 +12,32 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from phonotaxis.commands.arguments import (
-    LAW_HELP,
-    LAW_WORDS,
     completed_by,
     overrides,
     require_exports,
     say,
     take_exports,
+    take_laws,
     take_output,
     take_scenario,
 )
 from phonotaxis.commands.command import Command, Place, Take
 
 if TYPE_CHECKING:
-    from phonotaxis.result import Prepared
+    from diagrams.scenario.scenario import Scenario
+    from phonotaxis.law_runs import LawsResult
+    from phonotaxis.result import Prepared, Result
     from phonotaxis.runs import RunResult
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
     sound = parser.add_argument("--sound", metavar="FILE", help="sound file to play")
     completed_by(sound, "file")
-    completed_by(parser.add_argument("--law", help=LAW_HELP), LAW_WORDS)
+    take_laws(
+        parser,
+        "several laws run one after another, and one picture shows all paths; "
+        "all: every law for robots of this kind (default: the scenario's law)",
+    )
     take_scenario(parser)
     parser.add_argument(
         "--save-audio",
@@ -45,6 +52,17 @@ def _add_arguments(parser: ArgumentParser) -> None:
         "microphones, and needs ffmpeg",
     )
     parser.add_argument(
+        "--live",
+        action="store_true",
+        help="show the run in a browser while Drake's engine computes it",
+    )
+    parser.add_argument(
+        "--rate",
+        type=float,
+        metavar="RATE",
+        help="speed of --live: 1 is real time (default), 0 as fast as possible",
+    )
+    parser.add_argument(
         "--no-plots",
         action="store_true",
         help="write no pictures: only the replay and the numbers",
@@ -52,16 +70,44 @@ def _add_arguments(parser: ArgumentParser) -> None:
     take_output(parser)
 
 
-def _prepare(options: Namespace, take: Take) -> Prepared[RunResult]:
-    from analysis.run_error import RunError
+def _prepare(options: Namespace, take: Take) -> Prepared[Result]:
+    from diagrams.scenario.laws_of_kind import chosen_names
     from diagrams.scenario.loading import load_scenario
-    from diagrams.scenario.scenario_files import check_files
-    from phonotaxis.run_files import SavedAudio, SavedMovie
-    from systems.framework.input_error import InputError
 
     place = take(options.out)
     require_exports(options)
     scenario = load_scenario(options.scenario, _settings(options))
+    laws = chosen_names(options.law, scenario)
+    if len(laws) > 1:
+        return _prepare_laws(options, scenario, laws)
+    if laws:
+        scenario = scenario.with_(law=laws[0])
+    return _prepare_run(options, scenario, place)
+
+
+def _prepare_laws(
+    options: Namespace, scenario: Scenario, laws: list[str]
+) -> Prepared[LawsResult]:
+    from systems.framework.input_error import InputError
+
+    for option in ("save_audio", "movie"):
+        if getattr(options, option) is not None:
+            raise InputError(option, "is possible with one law only; give one --law")
+    say(f"simulating {scenario.name} under {', '.join(laws)}")
+
+    from phonotaxis.law_runs import prepare_laws, with_laws
+
+    return prepare_laws(with_laws(scenario, laws))
+
+
+def _prepare_run(
+    options: Namespace, scenario: Scenario, place: Place
+) -> Prepared[RunResult]:
+    from analysis.run_error import RunError
+    from diagrams.scenario.scenario_files import check_files
+    from phonotaxis.run_files import SavedAudio, SavedMovie
+    from systems.framework.input_error import InputError
+
     check_files(scenario)
     saved: SavedAudio | None = None
     if options.save_audio is not None:
@@ -71,11 +117,29 @@ def _prepare(options: Namespace, take: Take) -> Prepared[RunResult]:
     if options.movie is not None:
         movie = SavedMovie(options.movie, scenario)
         _require_outside(place, "movie", options.movie, movie.path)
+    if options.rate is not None and not options.live:
+        raise InputError("rate", f"{options.rate:g} needs --live; add --live")
     say(f"simulating {scenario.name}")
 
     from phonotaxis.runs import prepare_simulation
 
-    prepared = prepare_simulation(scenario, saved=saved, movie=movie)
+    if options.live:
+        from analysis.views.live_view import start_meshcat
+
+        meshcat = start_meshcat()
+        prepared = prepare_simulation(
+            scenario,
+            engine="drake",
+            saved=saved,
+            movie=movie,
+            meshcat=meshcat,
+            rate=options.rate,
+        )
+        print(f"live view: {meshcat.web_url()}", file=sys.stderr, flush=True)
+        if sys.stdin.isatty() and sys.stderr.isatty():
+            prepared = replace(prepared, stay=_stay)
+    else:
+        prepared = prepare_simulation(scenario, saved=saved, movie=movie)
 
     def run(progress: Callable[[float], None]) -> RunResult:
         try:
@@ -84,6 +148,13 @@ def _prepare(options: Namespace, take: Take) -> Prepared[RunResult]:
             raise RunError(str(error)) from error
 
     return replace(prepared, run=run)
+
+
+def _stay() -> None:
+    """Keeps the live view open until an interrupt."""
+    print("the live view stays open until Ctrl-C", file=sys.stderr, flush=True)
+    while True:
+        time.sleep(3600.0)
 
 
 def _require_outside(place: Place, option: str, given: str, path: Path) -> None:
@@ -102,7 +173,10 @@ def _require_outside(place: Place, option: str, given: str, path: Path) -> None:
 
 
 def _write(
-    options: Namespace, result: RunResult, document: dict[str, Any], directory: Path
+    options: Namespace,
+    result: RunResult | LawsResult,
+    document: dict[str, Any],
+    directory: Path,
 ) -> None:
     pictures = not options.no_plots
     result.write(
@@ -114,8 +188,6 @@ def _settings(options: Namespace) -> list[str]:
     settings = overrides(options)
     if options.sound is not None:
         settings += ["sound.kind=wav", f"sound.file={json.dumps(options.sound)}"]
-    if options.law is not None:
-        settings.append(f"law={options.law}")
     return settings
 
 
@@ -130,9 +202,11 @@ COMMAND = Command(
     examples=(
         "simulate",
         "simulate u_trap --law guarded",
+        "simulate default --law active,guarded --figures",
         "simulate my_scenario.yaml --seed 7 --out results/mine",
         "simulate --set source.speed_m_s=0.2 --set hearing=ideal --json",
         "simulate --law my_laws.py:soft --no-plots",
+        "simulate --live --rate 2",
         "simulate results/latest",
     ),
     synonyms=("run", "start"),

@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING
 
 from phonotaxis.commands.arguments import (
     say,
-    take_figures,
+    settings_of,
+    take_batch,
+    take_laws,
     take_output,
-    write_batch_files,
+    take_seed,
+    take_settings,
+    whole_seed,
 )
 from phonotaxis.commands.command import Command, Take
 
@@ -20,25 +24,23 @@ if TYPE_CHECKING:
 
 def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("sweep", metavar="SWEEP.yaml", help="see docs/compare.md")
-    parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=int,
-        help="local processes (default: one per core)",
+    take_laws(
+        parser,
+        "all: every law for robots of this kind (default: as in the file)",
     )
+    take_seed(parser, "seed of all draws (default: as in the file)")
+    take_settings(parser, "; with a comma, both are compared")
+    take_batch(parser, "runs in each cell of the grid (default: as in the file)")
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
         help="address of a Dask cluster, for example tcp://host:8786",
     )
-    parser.add_argument(
-        "--resume", action="store_true", help="continue with the runs in --out"
-    )
-    take_figures(parser)
     take_output(parser)
 
 
 def _prepare(options: Namespace, take: Take) -> Prepared[SweepResult]:
+    from analysis.batches.changed_plan import changed_plan
     from analysis.batches.options import check_options
     from analysis.batches.plan import load_sweep
 
@@ -48,7 +50,13 @@ def _prepare(options: Namespace, take: Take) -> Prepared[SweepResult]:
         scheduler=options.scheduler,
         resume=options.resume,
     )
-    plan = load_sweep(options.sweep)
+    plan = changed_plan(
+        load_sweep(options.sweep),
+        laws=options.law,
+        runs=options.runs,
+        seed=whole_seed(options, None),
+        settings=settings_of(options),
+    )
     plan.check()
     say(f"sweeping {options.sweep}")
 
@@ -69,9 +77,9 @@ COMMAND = Command(
     _add_arguments,
     _prepare,
     where="\nresults in {out}, report in {out}/report.html",
-    write=write_batch_files,
     examples=(
         "sweep docs/examples/crossing.yaml",
-        "sweep docs/examples/crossing.yaml --out results/crossing --resume",
+        "sweep docs/examples/crossing.yaml --out results/crossing --resume --runs 200",
+        "sweep docs/examples/crossing.yaml --law active,guarded --set hearing=ideal",
     ),
 )

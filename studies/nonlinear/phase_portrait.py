@@ -84,7 +84,7 @@ def head_on_model(contact: HeadOn) -> PointMass:
     depth = _FACE_M[1]
     return PointMass(
         law=contact.law,
-        rectangles=np.array([[0.5 * depth, 0.0, 0.0, depth, 2.0 * _FACE_M[0]]]),
+        rectangles=np.array([[0.5 * depth, 0.0, 0.0, depth, 2.0 * _FACE_M[0], 0.0]]),
         p_WS=p_WS,
         p_WP=np.array([-1.0, 0.0]),
         stiffness_n_m=scenario.follower.attraction.stiffness_n_m,

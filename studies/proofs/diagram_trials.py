@@ -117,7 +117,8 @@ def _certified_starts(
     rng = np.random.default_rng(scenario.seed)
     states = draw_starts(certificate, BATCH, rng)
     states = states[certificate.certified(states)]
-    bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
+    around = scenario.bodies().values()
+    bodies = [row for body in around for row in body.rectangles(0.0)]
     kept, poses, skipped = [], [], 0
     for state in states:
         pose = _pose(state, scenario)
@@ -180,7 +181,7 @@ def _mechanism(
     scenario: Scenario, pose: NDArray[np.float64], collision: Collision
 ) -> str:
     """Side of a contact: in the beams ahead of P, beside the robot, or behind."""
-    body = scenario.bodies()[collision.object].rectangle(collision.time)
+    (body,) = scenario.bodies()[collision.object].rectangles(collision.time)
     point = touching_point(robot_rectangle(pose, scenario.only.robot), body)
     p_WP = control_point(pose, scenario.only.robot.control_point_m)
     x, y = rotate(-pose[2], point[0] - p_WP[0], point[1] - p_WP[1])

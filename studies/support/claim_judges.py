@@ -246,7 +246,7 @@ def vibrates(summary: dict[str, Any]) -> tuple[str, str]:
 
 def blind(summary: dict[str, Any]) -> tuple[str, str]:
     """Most collisions with moving obstacles are with what no cone sees."""
-    counts = {"never heard": 0, "out of sight": 0}
+    counts = {"no echo": 0, "out of sight": 0}
     total = 0
     for scenario in (ONE, TWO):
         cell = _cell(summary, scenario, "active")
@@ -256,6 +256,6 @@ def blind(summary: dict[str, Any]) -> tuple[str, str]:
     never, out = (100.0 * counts[name] / max(total, 1) for name in counts)
     figure = (
         f"of {total} collisions of the active law with moving obstacles {never:.0f} % "
-        f"were with one that was never heard, {out:.0f} % with one out of sight"
+        f"were with one that gave no echo, {out:.0f} % with one out of sight"
     )
     return figure, "holds" if never + out > 50.0 else "not shown"

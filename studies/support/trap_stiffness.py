@@ -106,10 +106,16 @@ def _block_force(
     x, y, theta = place
     offset = case.only.robot.control_point_m
     pose = (x - offset * math.cos(theta), y - offset * math.sin(theta), theta)
-    bodies = [body.rectangle(0.0) for body in case.bodies().values()]
+    around = case.bodies().values()
+    bodies = [row for body in around for row in body.rectangles(0.0)]
     if sensing == "exact":
         vectors = nearest_vectors(
-            pose, bodies, offset, case.follower.ultrasonic.maximum_range_m, 1
+            pose,
+            bodies,
+            range(len(bodies)),
+            offset,
+            case.follower.ultrasonic.maximum_range_m,
+            1,
         )
     else:
         ranges = cone_ranges(

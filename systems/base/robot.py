@@ -36,9 +36,9 @@ class RobotParameters(Parameters):
 
     preset: RobotPreset = "han2019"
     """Named robot. It gives the values of all other fields that are not set."""
-    length_m: Length = 0.35
+    length_m: Annotated[Length, Field(le=10.0)] = 0.35
     """Extent of the body along its x axis, m."""
-    width_m: Length = 0.82
+    width_m: Annotated[Length, Field(le=10.0)] = 0.82
     """Extent of the body along its y axis, including the microphone bar, m."""
     control_point_m: Length = 0.175
     """Distance epsilon of the control point P ahead of the axle, m."""

@@ -22,6 +22,7 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem, LeafSystem_
 
+from systems.framework.arguments import with_checked_parameters
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays, read_lists
 from systems.framework.input_error import InputError
@@ -182,6 +183,9 @@ class _Declared:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
+        for name in ("__init__", "_construct"):  # a template has the latter
+            if name in vars(cls):
+                setattr(cls, name, with_checked_parameters(vars(cls)[name]))
         own = cls.__doc__ or ""
         if (cls.inputs or cls.outputs) and ".. pydrake_system::" not in own:
             cls.__doc__ = _with_port_table(cls)
@@ -462,6 +466,11 @@ class _DifferentiableBlock(LeafSystem_[AutoDiffXd], _Declared):
 
 #: Base class of a block that is a template, by scalar type.
 Block_: dict[Any, Any] = {float: Block, AutoDiffXd: _DifferentiableBlock}
+
+
+def period_of(block: Any) -> float | None:
+    """Returns the period of a block's step, s; None for any other Drake system."""
+    return getattr(block, "_Declared__tick_s", None)
 
 
 def _field_at(state: Any, name: str, _tick: int) -> Any:

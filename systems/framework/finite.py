@@ -23,6 +23,16 @@ from systems.framework.scalar_math import float_of
 _SCALAR = "_\N{MATHEMATICAL BOLD SCRIPT CAPITAL T}"
 
 
+def block_name(system: Any) -> str:
+    """Returns the name of a block's class, for messages.
+
+    The name does not contain the scalar type. For a diagram, it is the name of the
+    diagram.
+    """
+    name = type(system).__name__.partition(_SCALAR)[0]
+    return system.get_name() or name if name == "Diagram" else name
+
+
 def read_list(context: Any, port: Any) -> list[Any]:
     """Reads a vector input port and checks that its elements are finite.
 
@@ -132,7 +142,7 @@ def check_port(context: Any, port: Any, values: Any, field: str = "") -> None:
         ValueError: An element is not finite. The message names the block, the port, the
             element and the time.
     """
-    block = type(port.get_system()).__name__.partition(_SCALAR)[0]
+    block = block_name(port.get_system())
     time = float_of(context.get_time())
     remedy = "look for the block upstream that made it so"
     check_finite(

@@ -9,10 +9,11 @@ contains the full path of the field.
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, Strict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
 
 from systems.framework.input_error import InputError
 
@@ -48,7 +49,28 @@ NonNegativeDamping = Annotated[float, Field(ge=0.0, le=_LARGEST)]
 # YAML has lists, but no tuples. Therefore these types are not strict.
 Point = Annotated[tuple[Coordinate, Coordinate], Strict(False)]
 Waypoints = Annotated[tuple[Point, ...], Strict(False), Field(max_length=1_000)]
+Times = Annotated[tuple[Time, ...], Strict(False), Field(max_length=1_000)]
 Size = Annotated[tuple[Length, Length], Strict(False)]
+
+#: Categories of characters that change a terminal, end a line, or reverse a text.
+_CONTROL = {"Cc", "Zl", "Zp"}
+_BIDIRECTIONAL = {*"\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"}
+
+
+def _of_one_line(text: str) -> str:
+    for letter in text:
+        if unicodedata.category(letter) in _CONTROL or letter in _BIDIRECTIONAL:
+            code = f"U+{ord(letter):04X}"
+            raise InputError("", f"has the control character {code}; leave it out")
+    return text
+
+
+#: A text for names and titles: one line without control characters.
+Line = Annotated[
+    str,
+    AfterValidator(_of_one_line),
+    Field(json_schema_extra={"pattern": r"^[^\x00-\x1f\x7f-\x9f]*$"}),
+]
 
 
 class Parameters(BaseModel):

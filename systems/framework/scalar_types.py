@@ -26,21 +26,30 @@ class _Template(TemplateSystem):
         super().__init__(name, scalars, pairs, scope)
         self.__module__ = scope.__name__
 
-    def _on_add(self, param: Any, cls: type, skip_rename: Any) -> Any:
+    def _on_add(self, param: Any, cls: Any, skip_rename: Any) -> Any:
         if "_construct_copy" not in vars(cls):
-            _make_copyable(cls)
+            _make_copyable(cls, self.name)
         theirs = vars(scalar_conversion)
         searching = theirs["TemplateMethod"]
         theirs["TemplateMethod"] = functools.partial(searching, scope=scalar_conversion)
         try:
-            return super()._on_add(param, cls, skip_rename)
+            added = super()._on_add(param, cls, skip_rename)
         finally:
             theirs["TemplateMethod"] = searching
+        # Drake's constructor takes any arguments, and passes them to ``_construct``.
+        if "__signature__" in vars(cls):
+            self.__signature__ = shown = cls.__signature__
+            own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+            parameters = [own, *shown.parameters.values()]
+            vars(cls)["__init__"].__signature__ = shown.replace(parameters=parameters)
+        return added
 
 
-def _make_copyable(cls: Any) -> None:
+def _make_copyable(cls: Any, name: str) -> None:
     """Defines copies for another scalar type, with the arguments of the original."""
     construct = cls._construct
+    # Errors about arguments then name the block.
+    inspect.unwrap(construct).__qualname__ = name.rpartition(".")[2].removesuffix("_")
 
     @functools.wraps(construct)
     def construct_and_remember(

@@ -256,11 +256,12 @@ def ImpedanceController_(T):
 
         Args:
             law: A law of ``systems.laws.catalog`` that has a force, or a function
-                ``law(c, s, gains)``. The function returns the force away from the
+                ``law(c, s, ...)``. The function returns the force away from the
                 obstacle in N for a distance c in m and a speed s in m/s. It must use
                 pydrake.math, so that Drake can differentiate it.
             gains: Gains of the law. If None, a law of the catalog uses its default
                 gains.
+            arguments: Arguments of a function after c and s; None means ``(gains,)``.
             velocity_term: Definition of s: ``printed`` for the rate of change of the
                 collision vector, ``closing`` for the speed of approach.
             robot: Virtual mass, and position of the control point P.
@@ -277,6 +278,7 @@ def ImpedanceController_(T):
             *,
             law: Law | Callable[..., Any] = NONE,
             gains: Any = None,
+            arguments: tuple[Any, ...] | None = None,
             velocity_term: VelocityTerm = "printed",
             robot: RobotParameters = RobotParameters(),
             attraction: AttractionParameters = AttractionParameters(),
@@ -287,7 +289,8 @@ def ImpedanceController_(T):
             super().__init__(converter=converter)
             self.set_name("impedance_controller")
             force: Any = law
-            arguments: tuple[Any, ...] = (gains,)
+            if arguments is None:
+                arguments = (gains,)
             if isinstance(law, Law):
                 assert law.force is not None, f"{law.name} has no force"
                 force = law.force

@@ -14,6 +14,7 @@ from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.faults import STUCK_CLOSED, STUCK_OPEN, Fault, fault_ticks
 from systems.framework.signals import TICK_S
+from systems.ranging.owners import owners_of, with_last
 from systems.world.geometry import beyond_rectangle
 
 #: Distance between a body and the front edge up to which a switch closes, m.
@@ -36,6 +37,9 @@ class SwitchNumbers(NamedTuple):
     """Length of the body at ``pose_WS``, m."""
     width_m: float
     """Width of the body at ``pose_WS``, m."""
+    owners: NDArray[np.int64]
+    """(n + 1,) number of the body of each rectangle. The body at ``pose_WS`` is the
+    last one."""
     faults: NDArray[np.int64]
     """(2, 2) faults of the left and the right switch, from ``fault_ticks``."""
 
@@ -46,14 +50,14 @@ def _feel(
 ) -> tuple[bool, bool]:  # pragma: no cover  (compiled)
     """Returns whether a body closes the left switch, and whether it closes the right.
 
-    ``body`` has the pose (x, y, theta) of the body in W, m and rad, and its length and
-    width, m. ``points`` are the test points of the front edge in B, m. A touch closes
-    both switches if its distance from the robot's x axis is at most ``middle``, m.
+    ``body`` is a rectangle (x, y, theta, length, width, radius) in W, m and rad.
+    ``points`` are the test points of the front edge in B, m. A touch closes both
+    switches if its distance from the robot's x axis is at most ``middle``, m.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     # Skip a body whose circumscribed circle no switch can reach. The first test point,
     # a corner of the robot, is as far from the origin of B as any test point.
-    far = 0.5 * math.hypot(body[3], body[4]) + REACH_M
+    far = 0.5 * math.hypot(body[3], body[4]) + body[5] + REACH_M
     far += math.hypot(points[0, 0], points[0, 1])
     if math.hypot(body[0] - pose[0], body[1] - pose[1]) > far:
         return False, False
@@ -61,7 +65,7 @@ def _feel(
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         place = pose[0] + c * x - s * y, pose[1] + s * x + c * y
-        box = body[0], body[1], body[2], body[3], body[4]
+        box = body[0], body[1], body[2], body[3], body[4], body[5]
         off = beyond_rectangle(place, box)
         if math.hypot(off[0], off[1]) <= REACH_M:
             left = left or y >= -middle
@@ -78,22 +82,22 @@ def contact_switches_step(
     number.
     """
     pose, poses, sizes, followed = inputs
-    bodies = len(poses) // 3
+    rectangles = len(poses) // 3
     touched, left, right = -1, False, False
-    body = np.empty(5)
+    body = np.empty(6)
     # The body at pose_WS is the last one.
-    for number in range(bodies + 1):
-        if number < bodies:
+    for number in range(rectangles + 1):
+        if number < rectangles:
             for k in range(3):
                 body[k] = poses[3 * number + k]
-            body[3], body[4] = sizes[2 * number], sizes[2 * number + 1]
+                body[3 + k] = sizes[3 * number + k]
         else:
             for k in range(3):
                 body[k] = followed[k]
-            body[3], body[4] = numbers.length_m, numbers.width_m
+            body[3], body[4], body[5] = numbers.length_m, numbers.width_m, 0.0
         felt = _feel(pose, body, numbers.points, numbers.middle_m)
         if felt[0] or felt[1]:
-            touched = number
+            touched = numbers.owners[number]
         left, right = left or felt[0], right or felt[1]
     contact = outputs[0]
     contact[0], contact[1] = 1.0 if left else 0.0, 1.0 if right else 0.0
@@ -124,7 +128,9 @@ class ContactSwitches(Block):
     Args:
         faults: Faults of the robot. Only faults of ``contact_switches`` have an effect.
         robot: Size of the robot.
-        bodies: Number of bodies on the ports ``poses_WO`` and ``sizes``.
+        bodies: Number of rectangles on the ports ``poses_WO`` and ``sizes``.
+        owners: Number of the body of each rectangle, ascending from 0. None: each
+            rectangle is a body.
         source_size: Length and width of the body at ``pose_WS``, m.
         tick_s: Control period, s.
 
@@ -134,8 +140,8 @@ class ContactSwitches(Block):
     part, stage = "contact", "obstacle sensing"
     inputs = (
         Port("pose_WB", 3, "m, m, rad"),
-        Port("poses_WO", "3 bodies", "m, m, rad each"),
-        Port("sizes", "2 bodies", "m, m each"),
+        Port("poses_WO", "3 rectangles", "m, m, rad each"),
+        Port("sizes", "3 rectangles", "m, m, m each"),
         Port("pose_WS", 3, "m, m, rad"),
     )
     outputs = (
@@ -149,6 +155,7 @@ class ContactSwitches(Block):
         faults: Sequence[Fault] = (),
         robot: RobotParameters = RobotParameters(),
         bodies: int = 0,
+        owners: Sequence[int] | None = None,
         source_size: tuple[float, float] = (0.08, 0.08),
         tick_s: float = TICK_S,
     ) -> None:
@@ -160,11 +167,12 @@ class ContactSwitches(Block):
             front,
             _MIDDLE * robot.width_m,
             *source_size,
+            with_last(owners_of(bodies, owners)),
             fault_ticks(faults, "contact_switches", 2, tick_s),
         )
         self.declare(
             Step(contact_switches_step, numbers),
             tick_s=tick_s,
-            sizes={"bodies": bodies},
+            sizes={"rectangles": bodies},
             arrays=True,
         )

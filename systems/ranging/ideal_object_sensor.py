@@ -28,6 +28,7 @@ from systems.ranging.objects import (
     Y,
     nearest_objects,
 )
+from systems.ranging.owners import owners_of
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS, ObjectSensorParameters
 from systems.world.geometry import (
     control_point,
@@ -57,8 +58,10 @@ class ObjectNumbers(NamedTuple):
     """Whether bodies hide other bodies."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
+    owners: NDArray[np.int64]
+    """(n,) number of the body of each rectangle."""
     robots: NDArray[np.bool_]
-    """(n,) true for bodies that are robots."""
+    """(n,) true for rectangles of robots."""
     noise: TickNoise
     delay: int
     """Latency, ticks."""
@@ -67,16 +70,22 @@ class ObjectNumbers(NamedTuple):
 
 @njit(cache=True)
 def _see(
-    slot: Any, p_WP: Any, before: Any, now: Any, size: Any, tick_s: float
+    slot: Any,
+    p_WP: Any,
+    before: Any,
+    now: Any,
+    size: Any,
+    alone: bool,  # noqa: FBT001  # compiled code has no keywords
+    tick_s: float,
 ) -> None:  # pragma: no cover  (compiled)
-    """Fills the slot of one body, whose elements are zero before.
+    """Fills the slot of one rectangle of a body, whose elements are zero before.
 
     The function reports a body at rest as its nearest point, and a moving body as a
-    disc around its center. In two cases, it reports the nearest point of a moving body
-    instead: if the body is long, or if the disc contains the control point P.
-    ``tick_s`` is 0 if the velocity is unknown.
+    disc around its center. In three cases, it reports the nearest point of a moving
+    rectangle instead: if it is long, if it is not the whole body (``alone``), or if the
+    disc contains the control point P. ``tick_s`` is 0 if the velocity is unknown.
     """
-    rectangle = now[0], now[1], now[2], size[0], size[1]
+    rectangle = now[0], now[1], now[2], size[0], size[1], size[2]
     x, y = nearest_point_on_rectangle(p_WP, rectangle)
     slot[THERE], slot[X], slot[Y] = 1.0, x, y
     if tick_s == 0.0:
@@ -85,33 +94,37 @@ def _see(
     # Compare the fastest point of the body with the limit of a body at rest.
     vx, vy = (now[0] - before[0]) / tick_s, (now[1] - before[1]) / tick_s
     turn = ((now[2] - before[2] + math.pi) % math.tau - math.pi) / tick_s
-    radius = 0.5 * math.hypot(size[0], size[1])
+    radius = 0.5 * math.hypot(size[0], size[1]) + size[2]
+    longer = max(size[0], size[1]) + 2.0 * size[2]
+    shorter = min(size[0], size[1]) + 2.0 * size[2]
     if math.hypot(vx, vy) + abs(turn) * radius < _RESTS_M_S:
         return
-    # Vector from P to the center of the body.
+    # Vector from P to the center of the rectangle.
     cx, cy = now[0] - p_WP[0], now[1] - p_WP[1]
     far = math.hypot(cx, cy)
-    if max(size) <= _LONG * min(size) and far > radius:
+    if alone and longer <= _LONG * shorter and far > radius:
         slot[X], slot[Y] = cx * (1.0 - radius / far), cy * (1.0 - radius / far)
         slot[VX], slot[VY], slot[RADIUS] = vx, vy, radius
         return
-    # A long body, or a disc that contains P: velocity of the nearest point.
+    # Velocity of the nearest point.
     slot[VX], slot[VY] = vx - turn * (y - cy), vy + turn * (x - cx)
-    slot[RADIUS] = 0.5 * min(size)
+    slot[RADIUS] = 0.5 * shorter
 
 
 @njit(cache=True)
 def _is_hidden(
-    number: int, p_WP: Any, slot: Any, poses: Any, sizes: Any
+    number: int, p_WP: Any, slot: Any, poses: Any, sizes: Any, owners: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether other bodies hide the body ``number`` from the control point P.
+    """Returns whether other bodies hide the rectangle ``number`` from the point P.
 
-    A body is hidden if other bodies block five lines: the line from P to the reported
-    point of the body, and the lines from P to its four corners.
+    A rectangle is hidden if other bodies block five lines: the line from the control
+    point P to the reported point of the rectangle, and the lines from P to its four
+    corners. A round corner counts by its middle.
     """
     x, y, theta = poses[3 * number], poses[3 * number + 1], poses[3 * number + 2]
     c, s = 0.5 * math.cos(theta), 0.5 * math.sin(theta)
-    length, width = sizes[2 * number], sizes[2 * number + 1]
+    round_off = math.sqrt(2.0) * sizes[3 * number + 2]
+    length, width = sizes[3 * number] + round_off, sizes[3 * number + 1] + round_off
     for place in range(5):
         end = p_WP[0] + slot[X], p_WP[1] + slot[Y]
         if place > 0:
@@ -119,20 +132,20 @@ def _is_hidden(
             u = length if place < 3 else -length
             w = width if place % 2 else -width
             end = x + c * u - s * w, y + s * u + c * w
-        if not _is_blocked(number, p_WP, end, poses, sizes):
+        if not _is_blocked(owners[number], p_WP, end, poses, sizes, owners):
             return False
     return True
 
 
 @njit(cache=True)
 def _is_blocked(
-    number: int, p_WP: Any, end: Any, poses: Any, sizes: Any
+    owner: int, p_WP: Any, end: Any, poses: Any, sizes: Any, owners: Any
 ) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether a body other than ``number`` is on the line from P to a point."""
-    for k in range(len(sizes) // 2):
+    """Checks whether a body other than ``owner`` is on the line from P to a point."""
+    for k in range(len(sizes) // 3):
         x, y, theta = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
-        box = x, y, theta, sizes[2 * k], sizes[2 * k + 1]
-        if k != number and segment_clearance(p_WP, end, box) < _GRAZE_M:
+        box = x, y, theta, sizes[3 * k], sizes[3 * k + 1], sizes[3 * k + 2]
+        if owners[k] != owner and segment_clearance(p_WP, end, box) < _GRAZE_M:
             return True
     return False
 
@@ -147,18 +160,29 @@ def _seen(
     element of the state is 1 if poses are stored, otherwise 0. The poses of one control
     period ago follow.
     """
-    count = len(sizes) // 2
+    count, owners = len(sizes) // 3, numbers.owners
     p_WP = control_point(pose, numbers.control_point_m)
     slots = np.zeros((count, OBJECT_SIZE))
     tick_s = numbers.tick_s if state[0] > 0.0 else 0.0
+    nearest, first = np.inf, -1
     for k in range(count):
-        now, size = poses[3 * k : 3 * k + 3], sizes[2 * k : 2 * k + 2]
+        now, size = poses[3 * k : 3 * k + 3], sizes[3 * k : 3 * k + 3]
         slot = slots[k]
-        _see(slot, p_WP, state[1 + 3 * k : 4 + 3 * k], now, size, tick_s)
+        goes_on = k > 0 and owners[k - 1] == owners[k]
+        alone = not goes_on and (k + 1 == count or owners[k + 1] != owners[k])
+        _see(slot, p_WP, state[1 + 3 * k : 4 + 3 * k], now, size, alone, tick_s)
         slot[ROBOT] = 1.0 if numbers.robots[k] else 0.0
-        hidden = numbers.occlusion and _is_hidden(k, p_WP, slot, poses, sizes)
-        if hidden or math.hypot(slot[X], slot[Y]) > numbers.maximum_range_m:
+        away = math.hypot(slot[X], slot[Y])
+        hidden = numbers.occlusion and _is_hidden(k, p_WP, slot, poses, sizes, owners)
+        # Only the nearest visible rectangle of each body remains.
+        if not goes_on:
+            nearest, first = np.inf, -1
+        if hidden or away > numbers.maximum_range_m or away >= nearest:
             slot[:] = 0.0
+            continue
+        if first >= 0:
+            slots[first] = 0.0
+        nearest, first = away, k
     state[0] = 1.0
     state[1 : 1 + 3 * count] = poses
     return nearest_objects(slots)
@@ -172,7 +196,7 @@ def ideal_object_step(
     The state has these parts, in this order:
 
     - a flag that is 1 after the first period;
-    - the poses of the bodies one period ago;
+    - the poses of the rectangles one period ago;
     - with a latency, the objects that are not reported yet, oldest first.
     """
     pose, poses, sizes = inputs
@@ -207,9 +231,9 @@ class IdealObjectSensor(Block):
     - Moving body: the block replaces the body by the smallest disc that contains it and
       has the same center. The point is the nearest point of the disc. The velocity is
       that of the center.
-    - Moving body that is long, or whose disc contains P: the point is the nearest point
-      of the body. The velocity is that of this point. ``RADIUS`` is half of the width
-      of the body.
+    - Moving body that is long, or whose disc contains P, or that is a wall or a
+      polygon: the point is the nearest point of the body. The velocity is that of this
+      point. ``RADIUS`` is half of the width of the body, or of the wall.
 
     The block computes velocities from the present and the previous poses. Therefore
     velocities are known from the second control period on.
@@ -222,8 +246,10 @@ class IdealObjectSensor(Block):
     Args:
         parameters: Range, errors and latency.
         robot: Distance of P ahead of the axle.
-        bodies: Number of bodies on the ports ``poses_WO`` and ``sizes``.
-        robots: Indices of the bodies that are robots.
+        bodies: Number of rectangles on the ports ``poses_WO`` and ``sizes``.
+        owners: Number of the body of each rectangle, ascending from 0. None: each
+            rectangle is a body.
+        robots: Numbers of the bodies that are robots.
         seed: Seed of the noise.
         tick_s: Control period, s.
 
@@ -238,8 +264,8 @@ class IdealObjectSensor(Block):
     part, stage = "objects", "obstacle sensing"
     inputs = (
         Port("pose_WB", 3, "m, m, rad"),
-        Port("poses_WO", "3 bodies", "m, m, rad each"),
-        Port("sizes", "2 bodies", "m, m each"),
+        Port("poses_WO", "3 rectangles", "m, m, rad each"),
+        Port("sizes", "3 rectangles", "m, m, m each"),
     )
     outputs = (OBJECTS_PORT,)
 
@@ -249,6 +275,7 @@ class IdealObjectSensor(Block):
         parameters: ObjectSensorParameters = ObjectSensorParameters(),
         robot: RobotParameters = RobotParameters(),
         bodies: int = 0,
+        owners: Sequence[int] | None = None,
         robots: Sequence[int] = (),
         seed: int = 0,
         tick_s: float = TICK_S,
@@ -269,7 +296,8 @@ class IdealObjectSensor(Block):
             own.velocity_noise_m_s,
             own.occlusion,
             robot.control_point_m,
-            np.isin(np.arange(bodies), list(robots)),
+            owners_of(bodies, owners),
+            np.isin(owners_of(bodies, owners), list(robots)),
             tick_noise(seed),
             delay,
             tick_s,
@@ -278,6 +306,6 @@ class IdealObjectSensor(Block):
         self.declare(
             Step(ideal_object_step, numbers, state),
             tick_s=tick_s,
-            sizes={"bodies": bodies},
+            sizes={"rectangles": bodies},
             arrays=True,
         )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block_, Port, Step
@@ -18,12 +21,18 @@ from systems.ranging.collision_vector import (
     SLOTS,
     fill_slots,
 )
+from systems.ranging.owners import owners_of, with_last
 from systems.world.geometry import control_point, nearest_point_on_rectangle, rotate
 
 
 @register_jitable
 def nearest_vectors(
-    pose_WB: Any, rectangles: Any, control_point_m: Any, maximum_range: Any, slots: Any
+    pose_WB: Any,
+    rectangles: Any,
+    owners: Any,
+    control_point_m: Any,
+    maximum_range: Any,
+    slots: Any,
 ) -> Any:
     """Computes the vectors from the control point P to the nearest bodies.
 
@@ -31,8 +40,9 @@ def nearest_vectors(
 
     Args:
         pose_WB: Pose (x, y, theta) of the robot, m and rad; floats or AutoDiffXd.
-        rectangles: Rectangles (x, y, theta, length, width) of the bodies in the world
-            frame W, m and rad.
+        rectangles: Rectangles (x, y, theta, length, width, radius) of the bodies in the
+            world frame W, m and rad. Those of one body follow each other.
+        owners: Number of the body of each rectangle.
         control_point_m: Distance of P ahead of the axle, m.
         maximum_range: Largest distance from P at which bodies are seen, m.
         slots: Largest number of vectors.
@@ -42,12 +52,20 @@ def nearest_vectors(
         body, counted from 1. x and y are in the axes of the robot, m.
     """
     p_WP = control_point(pose_WB, control_point_m)
-    seen = []
+    seen: list[Any] = []
+    last = -1
     for index in range(len(rectangles)):
         dx, dy = nearest_point_on_rectangle(p_WP, rectangles[index])
         if dx * dx + dy * dy <= maximum_range * maximum_range:
             x, y = rotate(-pose_WB[2], dx, dy)
-            seen.append((float_of(dx * dx + dy * dy), 0.0 * x + (1.0 + index), x, y))
+            squared = float_of(dx * dx + dy * dy)
+            # Keep only the nearest rectangle of each body.
+            if len(seen) > 0 and owners[index] == last:
+                if squared >= seen[-1][0]:
+                    continue
+                seen.pop()
+            last = owners[index]
+            seen.append((squared, 0.0 * x + (1.0 + owners[index]), x, y))
     # The empty slice gives the empty list its type in compiled code.
     nearest = [(feature, x, y) for _, feature, x, y in seen[:0]]
     while len(nearest) < slots and len(seen) > 0:
@@ -71,6 +89,8 @@ class ObstacleNumbers(NamedTuple):
     """Largest number of vectors."""
     source_size: tuple[float, float]
     """Length and width of the leader, m."""
+    owners: NDArray[np.int64]
+    """(n + 1,) number of the body of each rectangle. The leader is the last body."""
 
 
 def ideal_obstacle_step(
@@ -79,14 +99,16 @@ def ideal_obstacle_step(
     """Computes the nearest points of the bodies in one control period."""
     pose_WB, poses, sizes, pose_WS = inputs
     length, width = numbers.source_size
-    bodies = [(pose_WS[0], pose_WS[1], pose_WS[2], length, width)]
-    for k in range(len(sizes) // 2):
+    bodies = [(pose_WS[0], pose_WS[1], pose_WS[2], length, width, 0.0)]
+    for k in range(len(sizes) // 3):
         x, y, theta = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
+        size = sizes[3 * k], sizes[3 * k + 1], float_of(sizes[3 * k + 2])
         # The leader stays the last body.
-        bodies.insert(k, (x, y, theta, sizes[2 * k], sizes[2 * k + 1]))
+        bodies.insert(k, (x, y, theta, size[0], size[1], size[2]))
     vectors = nearest_vectors(
         pose_WB,
         bodies,
+        numbers.owners,
         numbers.control_point_m,
         numbers.maximum_range_m,
         numbers.slots,
@@ -110,14 +132,17 @@ def IdealObstacleSensor_(T):
             all_bodies: Whether to report up to three bodies (``aggregation: sum``)
                 instead of only the nearest body.
             source_size: Length and width of the leader, m.
-            obstacle_count: Number of obstacles on the ports ``poses_WO`` and ``sizes``.
+            obstacle_count: Number of rectangles on the ports ``poses_WO`` and
+                ``sizes``.
+            owners: Number of the obstacle of each rectangle, ascending from 0. None:
+                each rectangle is an obstacle.
         """
 
         part, stage = "collision", "obstacle sensing"
         inputs = (
             Port("pose_WB", 3, "m, m, rad"),
-            Port("poses_WO", "3 bodies", "m, m, rad each"),
-            Port("sizes", "2 bodies", "m, m each"),
+            Port("poses_WO", "3 rectangles", "m, m, rad each"),
+            Port("sizes", "3 rectangles", "m, m, m each"),
             Port("pose_WS", 3, "m, m, rad"),
         )
         outputs = COLLISION_PORTS
@@ -130,6 +155,7 @@ def IdealObstacleSensor_(T):
             all_bodies: bool = False,
             source_size: Size = (0.326, 0.352),
             obstacle_count: int = 0,
+            owners: Sequence[int] | None = None,
             converter: Any = None,
         ) -> None:
             super().__init__(converter=converter)
@@ -141,11 +167,12 @@ def IdealObstacleSensor_(T):
                 maximum_range_m,
                 SLOTS if all_bodies else 1,
                 source_size,
+                with_last(owners_of(obstacle_count, owners)),
             )
             self.declare(
                 Step(ideal_obstacle_step, numbers),
                 tick_s=TICK_S,
-                sizes={"bodies": obstacle_count},
+                sizes={"rectangles": obstacle_count},
             )
 
     return Impl

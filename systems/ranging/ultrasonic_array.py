@@ -28,7 +28,7 @@ from systems.framework.parameters import (
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
 from systems.sound.acoustics import SOUND_SPEED_M_S
-from systems.world.geometry import fan_ranges
+from systems.world.cones import fan_ranges
 
 #: Additional standard deviation of the ranges of a noisy sensor, m.
 _NOISY_M = 0.3
@@ -41,23 +41,22 @@ def body_rectangles(
     """Collects the rectangles of the bodies, followed by empty rows for other bodies.
 
     Args:
-        poses_WO: (3 n,) poses (x, y, theta) of the bodies in the world frame W, m and
-            rad.
-        sizes: (2 n,) lengths and widths of the bodies, m.
+        poses_WO: (3 n,) poses (x, y, theta) of the rectangles in the world frame W, m
+            and rad.
+        sizes: (3 n,) lengths, widths and radii of the rectangles, m.
         more: Number of empty rows, which the caller fills.
 
     Returns:
-        (n + more, 5) rectangles: x, y, theta in W, m and rad, and length and width, m.
+        (n + more, 6) rectangles (x, y, theta, length, width, radius) in W, m and rad.
     """
-    count = len(sizes) // 2
-    rectangles = np.empty((count + more, 5))
+    count = len(sizes) // 3
+    rectangles = np.empty((count + more, 6))
     for k in range(count):
         # An assignment to a slice would also compile error messages about shapes,
         # which takes seconds.
         for i in range(3):
             rectangles[k, i] = poses_WO[3 * k + i]
-        for i in range(2):
-            rectangles[k, 3 + i] = sizes[2 * k + i]
+            rectangles[k, 3 + i] = sizes[3 * k + i]
     return rectangles
 
 
@@ -71,20 +70,21 @@ def world_rectangles(
     """Collects the rectangles of all bodies, with the leader as the last body.
 
     Args:
-        poses_WO: (3 n,) poses (x, y, theta) of the obstacles in the world frame W, m
-            and rad.
-        sizes: (2 n,) lengths and widths of the obstacles, m.
+        poses_WO: (3 n,) poses (x, y, theta) of the rectangles of the obstacles in the
+            world frame W, m and rad.
+        sizes: (3 n,) lengths, widths and radii of these rectangles, m.
         pose_WS: (3,) pose (x, y, theta) of the leader in W, m and rad.
         source_size: Length and width of the leader, m.
 
     Returns:
-        (n + 1, 5) rectangles: x, y, theta in W, m and rad, and length and width, m.
+        (n + 1, 6) rectangles (x, y, theta, length, width, radius) in W, m and rad.
     """
     rectangles = body_rectangles(poses_WO, sizes, 1)
     count = len(rectangles) - 1
     for i in range(3):
         rectangles[count, i] = pose_WS[i]
     rectangles[count, 3], rectangles[count, 4] = source_size
+    rectangles[count, 5] = 0.0
     return rectangles
 
 
@@ -98,8 +98,8 @@ def cone_ranges(
 
     Args:
         pose_WB: Pose (x, y, theta) of the robot, m and rad.
-        rectangles: (n, 5) rectangles (x, y, theta, length, width) of the bodies in the
-            world frame W, m and rad.
+        rectangles: (n, 6) rectangles (x, y, theta, length, width, radius) of the bodies
+            in the world frame W, m and rad.
         parameters: Positions and directions of the k sensors.
         control_point_m: Distance of the control point P ahead of the axle, m.
 
@@ -288,7 +288,7 @@ class UltrasonicArray(Block):
         assumed_sound_speed_m_s: Speed of sound with which the sensors convert time to
             range, m/s. None: the true speed.
         source_size: Length and width of the leader, m. None: there is no leader.
-        obstacle_count: Number of obstacles on the ports ``poses_WO`` and ``sizes``.
+        obstacle_count: Number of rectangles on the ports ``poses_WO`` and ``sizes``.
         seed: Seed of the noise.
         tick_s: Control period, s.
 
@@ -300,8 +300,8 @@ class UltrasonicArray(Block):
     part, stage = "ultrasonic", "obstacle sensing"
     inputs = (
         Port("pose_WB", 3, "m, m, rad"),
-        Port("poses_WO", "3 bodies", "m, m, rad each"),
-        Port("sizes", "2 bodies", "m, m each"),
+        Port("poses_WO", "3 rectangles", "m, m, rad each"),
+        Port("sizes", "3 rectangles", "m, m, m each"),
         Port("pose_WS", 3, "m, m, rad"),
     )
     outputs = (
@@ -348,7 +348,7 @@ class UltrasonicArray(Block):
                 [*parameters.each("maximum_range_m").tolist(), *[0.0] * count],
             ),
             tick_s=tick_s,
-            sizes={"bodies": obstacle_count, "sensors": count},
+            sizes={"rectangles": obstacle_count, "sensors": count},
             omit=() if source_size else ("pose_WS",),
             arrays=True,
         )

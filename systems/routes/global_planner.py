@@ -48,7 +48,7 @@ class PlannerNumbers(NamedTuple):
     grid: OccupancyGrid
     """Grid in which the cells too near to known obstacles are blocked."""
     rectangles: NDArray[np.float64]
-    """(k, 5) known obstacles in W."""
+    """(k, 6) rectangles of known obstacles in W."""
     goal: tuple[float, float]
     clearance_m: float
     replans: bool
@@ -137,8 +137,8 @@ class GlobalPlanner(Block):
 
     Args:
         parameters: Goal, clearance, and whether the block plans new routes.
-        known: (k, 5) known obstacles in the world frame W. Each row is (x, y, theta,
-            length, width), m and rad.
+        known: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
+            radius) in the world frame W, m and rad.
         initial_pose: (x, y, theta) of the robot at the start in W, m and rad.
         robot: Position of P on the robot.
         tick_s: Control period of the robot, s.
@@ -194,7 +194,7 @@ def _make_step(
     goal: tuple[float, float],
     known: ArrayLike,
 ) -> Step:
-    rectangles: NDArray[np.float64] = np.array(known, dtype=float).reshape(-1, 5)
+    rectangles: NDArray[np.float64] = np.array(known, dtype=float).reshape(-1, 6)
     start = control_point(initial_pose, robot.control_point_m)
     try:
         route = plan_route(

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
-from systems.world.geometry import beyond_rectangle, rectangle_corners
+from systems.world.geometry import beyond_rectangle
+from systems.world.shapes import rectangle_outline
 
 #: Side of a cell, m. The side is 1/3 of the least possible clearance. A straight step
 #: between two free cells therefore keeps at least 97 % of the clearance.
@@ -42,8 +43,8 @@ def map_grid(
 
     Args:
         points: (n, 2) start and goal in the world frame W, m.
-        rectangles: (k, 5) known obstacles in W. Each row is (x, y, theta, length,
-            width), m and rad.
+        rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
+            radius) in W, m and rad.
         clearance_m: A cell is blocked if its middle is nearer to an obstacle than this
             distance, m.
 
@@ -53,8 +54,8 @@ def map_grid(
     Raises:
         InputError: The grid would have too many cells.
     """
-    boxes = np.asarray(rectangles, dtype=float).reshape(-1, 5)
-    places = [np.asarray(points, dtype=float), *map(rectangle_corners, boxes)]
+    boxes = np.asarray(rectangles, dtype=float).reshape(-1, 6)
+    places = [np.asarray(points, dtype=float), *map(rectangle_outline, boxes)]
     low = np.min([np.min(place, axis=0) for place in places], axis=0) - ARENA_MARGIN_M
     high = np.max([np.max(place, axis=0) for place in places], axis=0) + ARENA_MARGIN_M
     grid = make_occupancy_grid((*low.tolist(), *high.tolist()))
@@ -132,8 +133,8 @@ def block_rectangles(
 
     Args:
         grid: The grid, modified in place.
-        rectangles: (k, 5) obstacles in the world frame W. Each row is (x, y, theta,
-            length, width), m and rad.
+        rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
+            radius) in the world frame W, m and rad.
         radius: Distance from the rectangles below which cells are blocked, m.
     """
     n, m = grid.blocked.shape
@@ -141,8 +142,8 @@ def block_rectangles(
         box = rectangles[k]
         # Rectangle along the axes of W that contains the enlarged obstacle.
         c, s = abs(math.cos(box[2])), abs(math.sin(box[2]))
-        half_x = 0.5 * (c * box[3] + s * box[4]) + radius
-        half_y = 0.5 * (s * box[3] + c * box[4]) + radius
+        half_x = 0.5 * (c * box[3] + s * box[4]) + box[5] + radius
+        half_y = 0.5 * (s * box[3] + c * box[4]) + box[5] + radius
         low_x, high_x = box[0] - half_x, box[0] + half_x
         low_y, high_y = box[1] - half_y, box[1] + half_y
         from_i, to_i = _span(low_x, high_x, grid.low[0], n)

@@ -132,7 +132,8 @@ def _clearance(
         # Skip the exact distance if the circles around segment and obstacle are far
         # apart.
         x, y = box[0] - a[0] - 0.5 * dx, box[1] - a[1] - 0.5 * dy
-        reach = 0.5 * (math.hypot(box[3], box[4]) + math.sqrt(squared)) + max(best, 0.0)
+        reach = 0.5 * (math.hypot(box[3], box[4]) + math.sqrt(squared))
+        reach += box[5] + max(best, 0.0)
         if x * x + y * y < reach * reach:
             best = min(best, segment_clearance(a, b, box))
             if best < least:
@@ -149,8 +150,8 @@ def place_clearance(
     Args:
         x: x coordinate of the point in the world frame W, m.
         y: y coordinate of the point in W, m.
-        rectangles: (k, 5) obstacles in W. Each row is (x, y, theta, length, width), m
-            and rad.
+        rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
+            radius) in W, m and rad.
         discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
 
     Returns:
@@ -343,8 +344,8 @@ def find_route(
             blocked.
         start: (x, y) in the world frame W, m.
         goal: (x, y) in W, m.
-        rectangles: (k, 5) obstacles in W. Each row is (x, y, theta, length, width), m
-            and rad.
+        rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
+            radius) in W, m and rad.
         discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
         clearance: Distance that the route keeps from obstacles, m.
 
@@ -418,8 +419,8 @@ def plan_route(
         start: (x, y) in the world frame W, m. If the start is nearer to an obstacle
             than the clearance, the route first leads away from this obstacle.
         goal: (x, y) in W, m.
-        rectangles: (k, 5) known obstacles in W. Each row is (x, y, theta, length,
-            width), m and rad.
+        rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
+            radius) in W, m and rad.
         clearance_m: Desired distance from known obstacles, m.
 
     Returns:
@@ -433,7 +434,7 @@ def plan_route(
     Reference: Engelbrecht, Steyn and Djouani (2021) name A* in sec. 2, but describe no
     grid. Hart, Nilsson and Raphael (1968) describe A*.
     """
-    known: NDArray[np.float64] = np.array(rectangles, dtype=float).reshape(-1, 5)
+    known: NDArray[np.float64] = np.array(rectangles, dtype=float).reshape(-1, 6)
     discs: NDArray[np.float64] = np.empty((0, 3))
     # Integers would trigger a new compilation.
     start = float(start[0]), float(start[1])

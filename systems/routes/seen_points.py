@@ -59,8 +59,8 @@ def remember_objects(
     Args:
         seen: Memory of points, modified in place.
         grid: Grid of the floor. The function remembers at most one point per cell.
-        rectangles: (k, 5) known obstacles in the world frame W. Each row is (x, y,
-            theta, length, width), m and rad.
+        rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
+            radius) in the world frame W, m and rad.
         objects: (64,) value of the port ``objects_W``, which lists the seen objects.
         p_WP: (x, y) of the control point P in W, m.
     """

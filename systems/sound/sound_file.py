@@ -41,6 +41,10 @@ UNKNOWN_FRAMES = 2**63 - 1
 #: Largest number of samples in all channels together. That many samples need 1 GB.
 MOST_SAMPLES = 2**27
 
+#: Largest sample. Full scale is 1, or 2^31 in files with unscaled numbers. The powers
+#: of larger samples would exceed the range of single precision.
+LARGEST_SAMPLE = 1e12
+
 #: Shortest loop of noise, s. A shorter loop would sound like a tone.
 _LEAST_NOISE_S = 0.2
 
@@ -98,8 +102,8 @@ def read_recording(path: str | Path, field: str) -> ReadSound:
 
     Raises:
         InputError: The file is missing, not a sound file, empty, or silent in every
-            channel. Or a sample is not finite, the file has more than ``MOST_SAMPLES``
-            samples, or its rate is outside 1 to 400 kHz.
+            channel. Or a sample is not finite or exceeds ``LARGEST_SAMPLE``, the file
+            has more than ``MOST_SAMPLES`` samples, or its rate is outside 1 to 400 kHz.
     """
     path = require_file(path, field, "WAV or FLAC")
     where = repr(str(path))
@@ -300,6 +304,12 @@ def _check_samples(samples: NDArray[np.float64], field: str, where: str) -> None
             field,
             f"{where} holds NaN or infinite samples, the first in channel "
             f"{channel + 1} as sample {sample}; export it again",
+        )
+    if (most := np.abs(samples).max()) > LARGEST_SAMPLE:
+        raise InputError(
+            field,
+            f"{where} holds samples up to {most:.1e}, and full scale is 1; export it "
+            "with 16 or 24 bits",
         )
     if not samples.any():
         raise InputError(field, f"{where} is silent throughout; use a file with sound")

@@ -1,4 +1,4 @@
-"""Boxes at rest and moving boxes that the robot must not touch."""
+"""Obstacles at rest and moving obstacles that the robot must not touch."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ def Obstacles_(T):
     class Impl(Block_[T]):
         """Publishes the poses, velocities, and sizes of the obstacles.
 
-        Each output port lists the values of all obstacles, one obstacle after the
-        other. The outputs depend only on time. The block has no state and no latency.
+        An obstacle consists of one or more rectangles (``systems.world.plane``). Each
+        output port lists the values of all rectangles, one obstacle after the other.
+        A size consists of length, width and radius. The outputs depend only on time.
+        The block has no state and no latency.
 
         Args:
             obstacles: A sequence of ``ObstacleParameters``.
@@ -27,9 +29,9 @@ def Obstacles_(T):
 
         part, stage = "obstacles", "world"
         outputs = (
-            Port("poses_WO", "3 obstacles", "m, m, rad each"),
-            Port("velocities_WO", "3 obstacles", "m/s, m/s, rad/s each"),
-            Port("sizes", "2 obstacles", "m, m each"),
+            Port("poses_WO", "3 rectangles", "m, m, rad each"),
+            Port("velocities_WO", "3 rectangles", "m/s, m/s, rad/s each"),
+            Port("sizes", "3 rectangles", "m, m, m each"),
         )
 
         def _construct(
@@ -40,22 +42,35 @@ def Obstacles_(T):
         ) -> None:
             super().__init__(converter=converter)
             self.set_name("obstacles")
-            self._paths = [obstacle.path() for obstacle in obstacles]
-            self._sizes = [extent for o in obstacles for extent in o.size_m]
-            moving = any(path.moves for path in self._paths)
+            self._bodies = [(each.path(), each.shape()) for each in obstacles]
+            rectangles = [row for _, shape in self._bodies for row in shape.rectangles]
+            self._sizes = [extent for row in rectangles for extent in row[3:]]
+            moving = any(path.moves for path, _ in self._bodies)
             ticket = self.time_ticket() if moving else self.nothing_ticket()
-            self.declare_ports(sizes={"obstacles": len(obstacles)})
+            self.declare_ports(sizes={"rectangles": len(rectangles)})
             self.declare_output("poses_WO", self._poses, {ticket})
             self.declare_output("velocities_WO", self._velocities, {ticket})
             self.declare_output("sizes", self._extents, {self.nothing_ticket()})
 
         def _poses(self, context, output):
             time = seconds(context)
-            output.SetFromVector(_flat(path.pose(time) for path in self._paths))
+            rows: list[Any] = []
+            for path, shape in self._bodies:
+                pose = path.pose(time)
+                rows += [pose] if shape.centered else [*shape.at(pose)[:, :3]]
+            output.SetFromVector(_flat(rows))
 
         def _velocities(self, context, output):
             time = seconds(context)
-            output.SetFromVector(_flat(path.velocity(time) for path in self._paths))
+            rows: list[Any] = []
+            for path, shape in self._bodies:
+                vx, vy, omega = path.velocity(time)
+                x, y, _ = pose = path.pose(time)
+                rows += [
+                    (vx - omega * (row[1] - y), vy + omega * (row[0] - x), omega)
+                    for row in shape.at(pose)
+                ]
+            output.SetFromVector(_flat(rows))
 
         def _extents(self, context, output):
             output.SetFromVector(np.array(self._sizes, dtype=float))

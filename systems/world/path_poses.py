@@ -17,9 +17,8 @@ def poses_on(
     """Computes the poses on a path at many times.
 
     Args:
-        pieces: (m, 7) pieces of the path. The columns are start time, s; x and y at the
-            start, m; theta at the start, rad; curvature, 1/m; speed at the start, m/s;
-            and acceleration, m/s^2.
+        pieces: (m, 8) pieces of the path. The columns are those of ``Piece`` in
+            ``systems/world/path_pieces.py``.
         elapsed: (n,) times since the start of the first piece, s.
 
     Returns:
@@ -30,14 +29,14 @@ def poses_on(
     cosines, sines = np.cos(pieces[:, 3]), np.sin(pieces[:, 3])
     for i in range(elapsed.size):
         k = np.searchsorted(begins, elapsed[i], side="right") - 1
-        begin, x, y, theta, curvature, speed, acceleration = pieces[k]
+        begin, x, y, theta, forward, curvature, speed, acceleration = pieces[k]
         since = elapsed[i] - begin
         chord = (speed + 0.5 * acceleration * since) * since
         half = 0.5 * curvature * chord
         c, s = cosines[k], sines[k]
         if half != 0.0:
             # Replace the arc length by the chord, which points along the mean heading.
-            chord *= math.sin(half) / half
+            chord *= forward * math.sin(half) / half
             c, s = math.cos(theta + half), math.sin(theta + half)
         poses[i, 0] = x + chord * c
         poses[i, 1] = y + chord * s

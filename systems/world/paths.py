@@ -2,7 +2,7 @@
 
 Circular arcs replace the corners between the waypoints. The speed rises and falls with
 a limited acceleration. Position and velocity are continuous, and explicit formulas give
-them at any time.
+them at any time. The heading is continuous up to whole turns.
 
 The yaw rate jumps at the ends of an arc. The yaw rate of a robot with wheels cannot
 jump, so ``systems/base/carrier.py`` computes the motion of such a robot.
@@ -13,15 +13,15 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.input_error import InputError
-
-AtEnd = Literal["stop", "shuttle"]
+from systems.world.path_motion import AtEnd, Motion, checked_waypoints, plan_motion
+from systems.world.path_pieces import Limits, Piece, rest
+from systems.world.path_segments import along
 
 #: Default acceleration of obstacles and of the leader, m/s^2 (not printed, our choice).
 #: It is a tenth of the acceleration at which wheels slip on a floor. A body that starts
@@ -33,56 +33,46 @@ ACCELERATION_M_S2 = 1.0
 _SLOWEST_M_S = 1e-9
 
 
-class _Segment(NamedTuple):
-    """A line (curvature 0) or an arc, given by its start pose and length."""
-
-    x: float
-    y: float
-    theta: float
-    curvature: float
-    length: float
-
-    def pose(self, s: float) -> tuple[float, float, float]:
-        return _along(self.x, self.y, self.theta, self.curvature, s)
-
-
-class _Piece(NamedTuple):
-    """A part of a segment with constant acceleration, given by its start."""
-
-    begin: float
-    x: float
-    y: float
-    theta: float
-    curvature: float
-    speed: float
-    acceleration: float
-
-
 class WaypointPath:
     """Pose and velocity of a body on a path through waypoints, as functions of time.
 
-    The motion starts and ends at rest. The speed along the path rises with the given
-    acceleration, stays constant, and falls with the same acceleration. On a short path,
-    the phase of constant speed is missing.
+    The motion starts at rest. The speed along the path rises with the given
+    acceleration, stays constant, and falls with the same acceleration to rest at the
+    last waypoint. On a short path, the phase of constant speed is missing.
+
+    A body that stops at a waypoint reaches the waypoint exactly. If the path bends
+    there, the body turns on the spot, at up to ``TURN_RATE_RAD_S`` with
+    ``TURN_ACCELERATION_RAD_S2``. A body also stops and turns where its path goes back
+    on the same line.
 
     Args:
         waypoints: Points in the world frame W, m. With one point, the body is at rest.
-        speed: Speed along the path, m/s, >= 0.
+        speed: Speed along the path, m/s, >= 0. With ``times``, it is the greatest
+            speed that they may need.
         acceleration: Acceleration along the path, m/s^2, > 0.
         corner_radius: Largest radius of the rounded corners, m, > 0. Two lines meet at
             a corner, and the arc replaces at most half of each line.
         start_time: Time until which the body rests at the first waypoint, s.
         at_end: ``stop``: the body rests at the last waypoint. ``shuttle``: the body
-            goes back and forth between both ends. It stops for an instant at each end
-            and returns backward, without turning around.
+            goes back and forth between both ends. It stops at each end and returns
+            backward, without turning around. ``loop``: the body drives from the last
+            waypoint to the first, and repeats the closed path for ever. The last
+            waypoint may repeat the first.
         heading: Heading of a body with one waypoint, rad. With several waypoints, the
             heading is the tangent of the path.
-        top_yaw_rate: Largest yaw rate in corners, rad/s, > 0. It limits the speed on
-            arcs.
+        top_yaw_rate: Largest yaw rate, rad/s, > 0. It limits the speed on arcs.
+        pauses: Time at each waypoint, s, or nothing. The body does not stop at a
+            waypoint with the pause 0. The pause contains the turn on the spot, and it
+            takes longer if the turn does.
+        times: Time at which the body reaches each waypoint, s from ``start_time`` on,
+            or nothing. The speed between two waypoints then follows from their times
+            and the acceleration. The body passes the middle of a rounded corner at
+            the time of its waypoint.
 
     Raises:
-        InputError: There is no waypoint, two neighbors coincide, the path doubles back
-            on itself, or the corner radius is not above 0.
+        InputError: There is no waypoint, two neighbors coincide, the corner radius is
+            not above 0, the pauses or times do not fit the waypoints, or the times need
+            a motion beyond a limit.
     """
 
     def __init__(
@@ -96,73 +86,71 @@ class WaypointPath:
         at_end: AtEnd = "stop",
         heading: float = 0.0,
         top_yaw_rate: float = math.inf,
+        pauses: Sequence[float] = (),
+        times: Sequence[float] = (),
     ) -> None:
-        if not waypoints:
-            raise InputError("waypoints_m", "no point is given; give at least one")
         if not corner_radius > 0.0:
             raise InputError(
                 "corner_radius_m",
                 f"at {corner_radius} m the velocity would jump at each waypoint; give "
                 "a radius above 0",
             )
-        segments = _segments(waypoints, corner_radius)
-        self._length = math.fsum(segment.length for segment in segments)
-        self._moves = bool(segments) and speed > _SLOWEST_M_S
+        course = checked_waypoints(waypoints, pauses, times, at_end)
+        self._moves = len(waypoints) > 1 and speed > _SLOWEST_M_S
         self._start_time = start_time
-        self._shuttles = self._moves and at_end == "shuttle"
-        limits = [
-            min(speed, top_yaw_rate / abs(segment.curvature))
-            if segment.curvature
-            else speed
-            for segment in segments
-        ]
-        pieces, self._duration = (
-            _pieces(segments, limits, acceleration) if self._moves else ([], 0.0)
-        )
-        first = segments[0].pose(0.0) if segments else (*waypoints[0], heading)
-        end = segments[-1].pose(segments[-1].length) if self._moves else first
-        self._pieces = [*pieces, _Piece(self._duration, *end, 0.0, 0.0, 0.0)]
+        x, y = map(float, waypoints[0])
+        pose, length = (x, y, heading), 0.0
+        if len(waypoints) > 1:
+            limits = Limits(speed if self._moves else 1.0, acceleration, top_yaw_rate)
+            motion = plan_motion(course, at_end, corner_radius, limits)
+            first = motion.pieces[0]
+            pose, length = (first.x, first.y, first.theta), motion.length
+        if not self._moves:
+            motion = Motion([rest(0.0, pose)], math.inf, math.inf, 0.0, length)
+        self._motion, self._pieces = motion, motion.pieces
         self._begins = [piece.begin for piece in self._pieces]
 
     @property
     def length(self) -> float:
-        """Length of the path with its rounded corners, m."""
-        return self._length
+        """Length of the path with its rounded corners, m; of a lap if it is closed."""
+        return self._motion.length
 
     @property
     def duration(self) -> float:
-        """Time from the first waypoint to the last, s; 0 for a body at rest."""
-        return self._duration
+        """Time from the start to the last waypoint, or of a lap, s; 0 at rest."""
+        return self._motion.duration
 
     @property
     def moves(self) -> bool:
         """Whether the body ever leaves its first waypoint."""
         return self._moves
 
-    def _find(self, time: float) -> tuple[_Piece, float, float]:
-        """Returns the piece, the distance from its start, m, and the speed, m/s."""
-        elapsed, direction = max(time - self._start_time, 0.0), 1.0
-        if self._shuttles:
-            laps, elapsed = divmod(elapsed, self._duration)
-            if laps % 2:
-                elapsed, direction = self._duration - elapsed, -1.0
+    def _find(self, time: float) -> tuple[Piece, float, float]:
+        """Returns the piece, the distance from its start, m, and the speed, m/s.
+
+        In a turn on the spot, the distance is in rad and the speed in rad/s.
+        """
+        elapsed = max(time - self._start_time, 0.0)
+        begin, period = self._motion.repeats_from, self._motion.period
+        if elapsed > begin:
+            elapsed = begin + (elapsed - begin) % period
         piece = self._pieces[bisect_right(self._begins, elapsed) - 1]
         since = elapsed - piece.begin
         distance = (piece.speed + 0.5 * piece.acceleration * since) * since
-        return piece, distance, direction * (piece.speed + piece.acceleration * since)
+        return piece, distance, piece.speed + piece.acceleration * since
 
     def pose(self, time: float) -> tuple[float, float, float]:
         """Returns (x, y, theta) in W, m and rad, at a time in s."""
         piece, s, _ = self._find(time)
-        return _along(piece.x, piece.y, piece.theta, piece.curvature, s)
+        return along(*piece[1:6], s)
 
     def velocity(self, time: float) -> tuple[float, float, float]:
         """Returns (vx, vy, omega) in W, m/s and rad/s, at a time in s."""
         piece, s, rate = self._find(time)
-        theta = piece.theta + piece.curvature * s
+        theta, forward = piece.theta + piece.curvature * s, piece.forward * rate
         return (
-            rate * math.cos(theta),
-            rate * math.sin(theta),
+            forward * math.cos(theta),
+            forward * math.sin(theta),
             rate * piece.curvature,
         )
 
@@ -173,7 +161,7 @@ class WaypointPath:
             return np.full((len(times), 3), self._pieces[0][1:4])
         from systems.world.path_poses import poses_on  # compiled code: when it is used
 
-        return poses_on(np.array(self._pieces), self._elapsed(times)[0])
+        return poses_on(np.array(self._pieces), self._elapsed(times))
 
     def twists(self, times: ArrayLike) -> NDArray[np.float64]:
         """Returns an (n, 2) array: forward speed and yaw rate at each of n times.
@@ -181,11 +169,13 @@ class WaypointPath:
         The times are in s, the speeds in m/s, and the yaw rates in rad/s. On its way
         back, a shuttle drives backward, so its speed is negative.
         """
-        elapsed, direction = self._elapsed(np.asarray(times, dtype=float))
+        elapsed = self._elapsed(np.asarray(times, dtype=float))
         index = np.searchsorted(self._begins, elapsed, side="right") - 1
-        begin, *_, curvature, speed, acceleration = np.array(self._pieces)[index].T
-        rate = direction * (speed + acceleration * (elapsed - begin))
-        return np.stack([rate, rate * curvature], axis=1)
+        begin, *_, forward, curvature, speed, acceleration = np.array(self._pieces)[
+            index
+        ].T
+        rate = speed + acceleration * (elapsed - begin)
+        return np.stack([rate * forward, rate * curvature], axis=1)
 
     def extreme_twists(self, until: float) -> NDArray[np.float64]:
         """Returns the speeds and yaw rates at both ends of each piece of the path.
@@ -201,149 +191,25 @@ class WaypointPath:
             rad/s.
         """
         rows, last = [], until - self._start_time
-        for piece, end in zip(self._pieces, self._begins[1:], strict=False):
+        ends = [*self._begins[1:], self._motion.repeats_from + self._motion.period]
+        for piece, after in zip(self._pieces, ends, strict=True):
+            if math.isinf(after):  # the body rests at the end of its path
+                break
             if piece.begin > last:
                 break
-            for elapsed in (piece.begin, min(end, last)):
+            for elapsed in (piece.begin, min(after, last)):
                 rate = piece.speed + piece.acceleration * (elapsed - piece.begin)
-                rows.append((rate, rate * piece.curvature))
+                rows.append((rate * piece.forward, rate * piece.curvature))
         return np.reshape(rows, (-1, 2))
 
-    def _elapsed(self, times: NDArray[np.float64]) -> tuple[Any, Any]:
-        """Returns the times in s on the forward motion, and the direction, 1 or -1."""
+    def _elapsed(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Returns the times in s since the start, in the first period if it repeats."""
         elapsed = np.maximum(times - self._start_time, 0.0)
-        if not self._shuttles:
-            return elapsed, 1.0
-        laps, elapsed = np.divmod(elapsed, self._duration)
-        back = laps % 2 == 1
-        return (
-            np.where(back, self._duration - elapsed, elapsed),
-            np.where(back, -1.0, 1.0),
-        )
-
-
-def _along(
-    x: float, y: float, theta: float, curvature: float, s: float
-) -> tuple[float, float, float]:
-    """Returns the pose at the distance s along a line or an arc."""
-    if curvature == 0.0:
-        return x + s * math.cos(theta), y + s * math.sin(theta), theta
-    end = theta + curvature * s
-    return (
-        x + (math.sin(end) - math.sin(theta)) / curvature,
-        y - (math.cos(end) - math.cos(theta)) / curvature,
-        end,
-    )
-
-
-def _pieces(
-    segments: Sequence[_Segment], limits: Sequence[float], acceleration: float
-) -> tuple[list[_Piece], float]:
-    """Returns the pieces of the fastest motion along segments, and its duration in s.
-
-    The motion starts and ends at rest. The function works with squared speeds, which
-    are linear in the distance. A forward pass over the ends of the segments limits each
-    squared speed to what the acceleration can reach. A backward pass limits it to a
-    value from which the body can brake in time. Then the function splits each segment
-    into up to three pieces: speeding up, constant speed, and braking. ``limits`` has
-    the top speed on each segment, m/s.
-    """
-    tops = [limit * limit for limit in limits]
-    joints = [0.0, *(min(pair) for pair in pairwise(tops)), 0.0]
-    gains = [2.0 * acceleration * segment.length for segment in segments]
-    for k, gain in enumerate(gains):
-        joints[k + 1] = min(joints[k + 1], joints[k] + gain)
-    for k, gain in reversed(list(enumerate(gains))):
-        joints[k] = min(joints[k], joints[k + 1] + gain)
-    pieces: list[_Piece] = []
-    begin = 0.0
-    for segment, top, gain, (first, last) in zip(
-        segments, tops, gains, pairwise(joints), strict=True
-    ):
-        peak = min(top, 0.5 * (first + last + gain))
-        up = (peak - first) / (2.0 * acceleration)
-        down = (peak - last) / (2.0 * acceleration)
-        ways = (
-            (0.0, up, first, peak, acceleration),
-            (up, segment.length - up - down, peak, peak, 0.0),
-            (segment.length - down, down, peak, last, -acceleration),
-        )
-        for start, way, before, after, rate in ways:
-            if way > 0.0:
-                speed = math.sqrt(before)
-                pose = segment.pose(start)
-                piece = _Piece(begin, *pose, segment.curvature, speed, rate)
-                pieces.append(piece)
-                begin += 2.0 * way / (speed + math.sqrt(after))
-    return pieces, begin
-
-
-def _segments(
-    waypoints: Sequence[tuple[float, float]], corner_radius: float
-) -> list[_Segment]:
-    """Computes the lines between the waypoints, and the arcs that join the lines."""
-    legs = []
-    for (x0, y0), (x1, y1) in pairwise(waypoints):
-        length = math.hypot(x1 - x0, y1 - y0)
-        if length < 1e-9:
-            raise InputError(
-                "waypoints_m",
-                f"({x0}, {y0}) is listed twice in a row; remove one of them",
-            )
-        legs.append((x0, y0, math.atan2(y1 - y0, x1 - x0), length))
-
-    segments: list[_Segment] = []
-    trimmed = 0.0
-    for index, (x, y, theta, length) in enumerate(legs):
-        arc = None
-        cut = 0.0
-        if index + 1 < len(legs):
-            _, _, next_theta, next_length = legs[index + 1]
-            turn = math.remainder(next_theta - theta, math.tau)
-            if abs(abs(turn) - math.pi) < 1e-6:
-                raise InputError(
-                    "waypoints_m",
-                    f"the path doubles back at waypoint {index + 1}; "
-                    "move a waypoint aside, or use at_end: shuttle",
-                )
-            arc, cut = _corner(turn, corner_radius, min(length, next_length) / 2)
-        line = length - trimmed - cut
-        if line > 1e-12:
-            segments.append(
-                _Segment(
-                    x + trimmed * math.cos(theta),
-                    y + trimmed * math.sin(theta),
-                    theta,
-                    0.0,
-                    line,
-                )
-            )
-        if arc is not None:
-            curvature, arc_length = arc
-            start = length - cut
-            segments.append(
-                _Segment(
-                    x + start * math.cos(theta),
-                    y + start * math.sin(theta),
-                    theta,
-                    curvature,
-                    arc_length,
-                )
-            )
-        trimmed = cut
-    return segments
-
-
-def _corner(
-    turn: float, radius: float, room: float
-) -> tuple[tuple[float, float] | None, float]:
-    """Returns (curvature, length) of the arc, and the length it cuts off each leg."""
-    if abs(turn) < 1e-9:
-        return None, 0.0
-    half = math.tan(abs(turn) / 2.0)
-    radius = min(radius, room / half)
-    arc = (math.copysign(1.0 / radius, turn), radius * abs(turn))
-    return arc, radius * half
+        begin, period = self._motion.repeats_from, self._motion.period
+        if not math.isfinite(period):
+            return elapsed
+        again = begin + np.mod(elapsed - begin, period)
+        return np.where(elapsed > begin, again, elapsed)
 
 
 def seconds(context: Any) -> float:

@@ -3,9 +3,12 @@
 The checks of parameters use these functions. Compiled code gets the same functions from
 ``systems.world.geometry``.
 
-A rectangle is a tuple (x, y, theta, length, width) in m and rad. The center (x, y) and
-the heading theta are given in any frame that the caller chooses. The length is along
-the rectangle's own x axis. The width is along its own y axis.
+A rectangle is a tuple (x, y, theta, length, width, radius) in m and rad. The center
+(x, y) and the heading theta are given in any frame that the caller chooses. The length
+is along the rectangle's own x axis. The width is along its own y axis. The radius
+thickens the rectangle: all points within the radius of it belong to it, too, so that
+its corners are round. A disc has the length 0 and the width 0. A line segment has only
+a length. Both may be 0 for any radius.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.framework.elementary import cos, sin
+from systems.framework.elementary import cos, sin, sqrt
 
 
 def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
@@ -58,16 +61,71 @@ def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
 
     Args:
         point: (x, y), m; floats, AutoDiffXd, or arrays.
-        rectangle: (x, y, theta, length, width) in the same frame, m and rad. Each
-            component may be an array.
+        rectangle: (x, y, theta, length, width, radius) in the same frame, m and rad.
+            Each component except the radius may be an array.
 
     Returns:
         Vector (du, dv) in the rectangle's own axes, m. It is (0, 0) if the point is
         inside the rectangle.
     """
-    x, y, theta, length, width = rectangle
+    x, y, theta, length, width, radius = rectangle
     u, v = rotate(-theta, point[0] - x, point[1] - y)
-    return outside(u, length / 2.0), outside(v, width / 2.0)
+    du, dv = outside(u, length / 2.0), outside(v, width / 2.0)
+    if radius == 0.0:
+        return du, dv
+    return shortened(du, dv, radius)
+
+
+def shortened(u: Any, v: Any, by: float) -> tuple[Any, Any]:
+    """Shortens a vector (u, v), or replaces it by (0, 0) if it is not long enough.
+
+    The function calls ``shorten`` for numbers and ``shorten_each`` for arrays.
+
+    Args:
+        u: First component in any unit; float, AutoDiffXd, or array.
+        v: Second component in the same unit.
+        by: Length to take away, in the same unit.
+
+    Returns:
+        Components of the shorter vector, with the type of u and v.
+    """
+    return shorten_each(u, v, by) if isinstance(u, np.ndarray) else shorten(u, v, by)
+
+
+def shorten(u: Any, v: Any, by: float) -> tuple[Any, Any]:
+    """Does what ``shortened`` does, for numbers. Compiled code may call it.
+
+    Args:
+        u: First component in any unit; float or AutoDiffXd.
+        v: Second component in the same unit.
+        by: Length to take away, in the same unit.
+
+    Returns:
+        Components of the shorter vector, with the type of u and v.
+    """
+    squared = u * u + v * v
+    if squared <= by * by:
+        return 0.0 * u, 0.0 * v
+    share = 1.0 - by / sqrt(squared)
+    return share * u, share * v
+
+
+def shorten_each(
+    u: NDArray[np.float64], v: NDArray[np.float64], by: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Does what ``shortened`` does, for each element of two arrays.
+
+    Args:
+        u: First components of any shape, in any unit.
+        v: Second components of the same shape, in the same unit.
+        by: Length to take away, in the same unit.
+
+    Returns:
+        Components of the shorter vectors.
+    """
+    length = np.sqrt(u * u + v * v)
+    share = 1.0 - by / np.maximum(length, by)
+    return share * u, share * v
 
 
 def outside(u: Any, half: Any) -> Any:
@@ -119,17 +177,35 @@ def beyond_each(u: NDArray[np.float64], half: ArrayLike) -> NDArray[np.float64]:
     return u - np.clip(u, -np.asarray(half), half)
 
 
+def rectangle_corners(rectangle: ArrayLike) -> NDArray[np.float64]:
+    """Returns the (4, 2) corners, counterclockwise from front left, m.
+
+    Args:
+        rectangle: (6,) rectangle (x, y, theta, length, width, radius), m and rad.
+
+    Returns:
+        Corners in the frame of the rectangle. If the rectangle has a radius, these are
+        the centers of its round corners.
+    """
+    x, y, theta, length, width, _ = np.asarray(rectangle, dtype=float)
+    signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    local = signs * np.array([length / 2.0, width / 2.0])
+    c, s = math.cos(theta), math.sin(theta)
+    return local @ np.array([[c, s], [-s, c]]) + np.array([x, y])
+
+
 def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Computes the distance between two rectangles, which is negative if they overlap.
 
     If the rectangles overlap, the result is minus the depth of the overlap. The depth
     is the length of the shortest motion that separates the rectangles (separating-axis
     test). Otherwise a corner of one rectangle is nearest to the other rectangle, and
-    the result is the distance of this corner.
+    the result is the distance of this corner. The radii reduce this result for the
+    rectangles without radii.
 
     Args:
-        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
-        b: (5,) second rectangle in the same frame.
+        a: (6,) first rectangle (x, y, theta, length, width, radius), m and rad.
+        b: (6,) second rectangle in the same frame.
 
     Returns:
         Clearance, m.
@@ -139,7 +215,7 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
     for _, _, ahead, touching in sides:
         separation = max(separation, abs(ahead) - touching)
     if separation <= 0.0:
-        return separation
+        return separation - (a[5] + b[5])
     (ca, sa, ua, _), (_, _, va, _), (cb, sb, ub, _), (_, _, vb, _) = sides
     c, s = ca * cb + sa * sb, ca * sb - sa * cb
     half_a, half_b = (a[3] / 2.0, a[4] / 2.0), (b[3] / 2.0, b[4] / 2.0)
@@ -147,7 +223,7 @@ def rectangle_clearance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float
         nearest_corner(ua, va, c, s, half_b, half_a),
         nearest_corner(-ub, -vb, c, -s, half_a, half_b),
     )
-    return math.sqrt(squared)
+    return math.sqrt(squared) - (a[5] + b[5])
 
 
 def side_normals(
@@ -155,11 +231,12 @@ def side_normals(
 ) -> tuple[tuple[float, float, float, float], ...]:
     """Returns the unit normals of the sides of two rectangles, each with two distances.
 
-    The first two normals are those of a. The last two normals are those of b.
+    The first two normals are those of a. The last two normals are those of b. The
+    function ignores the radii of the rectangles.
 
     Args:
-        a: (5,) first rectangle (x, y, theta, length, width), m and rad.
-        b: (5,) second rectangle in the same frame.
+        a: (6,) first rectangle (x, y, theta, length, width, radius), m and rad.
+        b: (6,) second rectangle in the same frame.
 
     Returns:
         One tuple (x, y, ahead, touching) per normal (x, y). ``ahead`` is the signed

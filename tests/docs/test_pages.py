@@ -19,8 +19,10 @@ PAGES = (
     "your_scenario.md",
     "your_law.md",
     "extending.md",
+    "test_your_block.md",
     "stability_report.md",
     "your_recording.md",
+    "your_diagram.md",
 )
 #: What only works in a clone, and was done before.
 IN_A_CLONE = ("make ", ". .venv", "git ", "pip ", "cd ")

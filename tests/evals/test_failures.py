@@ -20,8 +20,8 @@ NO_BOX = (
 )
 RUNS = {
     "out of sight": "two_static_obstacles --law conventional",
-    "never heard": "two_moving_obstacles --law conventional",
-    "heard late": (
+    "no echo": "two_moving_obstacles --law conventional",
+    "late echo": (
         "one_moving_obstacle --law conventional "
         "--set source.waypoints_m=[[1.6,0],[7,-0.8]] --set obstacles.0.speed_m_s=0.47 "
         "--set obstacles.0.waypoints_m=[[3.45,2.4],[3.05,-3]] "
@@ -39,7 +39,7 @@ RUNS = {
         "--set laws.conventional.stiffness_n_m=41.9 "
         "--set laws.conventional.damping_n_s_m=6.72"
     ),
-    "pushed too little": TRAP.format("active"),
+    "echo in time": TRAP.format("active"),
 }
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.safety.driver_trials import draw_trial, make_trial, run_trial
 from diagrams import Scenario, load_scenario, simulate
+from phonotaxis.testing import Bench
 from studies.support.crossing_trials import contact_speeds, draw_crossing
 from systems.base.diff_drive_plant import DiffDrivePlant, body_twist
 from systems.base.lagged_motion import advance_pose, lagged_motion
@@ -28,7 +29,8 @@ from systems.safety.braking import braked, roll_on
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
 from systems.safety.views import PlaceError, lasting
-from systems.world.geometry import fan_ranges, rectangle_clearance
+from systems.world.cones import fan_ranges
+from systems.world.geometry import rectangle_clearance
 
 SEED = 7
 RADIUS = 0.5 * math.hypot(0.35, 0.82)
@@ -73,7 +75,8 @@ def test_a2_no_obstacle_is_nearer_than_a_reading_inside_its_aperture():
     for _ in range(300):
         pose = draw.uniform(-1.0, 1.0, 3)
         boxes = draw.uniform([-2, -2, -3, 0.02, 0.02], [2, 2, 3, 1.0, 1.0], (4, 5))
-        ranges = fan_ranges(pose, boxes, axes, places, halves, 0.175)
+        rows = np.pad(boxes, ((0, 0), (0, 1)))
+        ranges = fan_ranges(pose, rows, axes, places, halves, 0.175)
         sensor = pose[:2] + 0.175 * np.array([math.cos(pose[2]), math.sin(pose[2])])
         for x, y, theta, length, width in boxes:
             u, v = draw.uniform(-0.5, 0.5, (2, 400))
@@ -236,11 +239,8 @@ def test_a4_what_is_forgotten_beside_it_is_not_driven_into():
 def braking_way(friction: float | None, speed: float = 0.72) -> float:
     """Way to rest, m, of the plant's own equations in steps of 1 ms."""
     plant = PlantParameters(friction=friction)
-    block = DiffDrivePlant(plant=plant)
-    context = block.CreateDefaultContext()
-    port = block.GetInputPort("wheel_speeds")
-    port.FixValue(context, [0.0, 0.0])
-    state = np.zeros(context.num_continuous_states())
+    at = Bench(DiffDrivePlant(plant=plant))
+    state = np.zeros(len(at.state))
     state[5:7] = speed / 0.06
     if friction is not None:
         state[7] = speed
@@ -248,10 +248,10 @@ def braking_way(friction: float | None, speed: float = 0.72) -> float:
     commanded: Any = (speed / 0.06,) * 2
     for _ in range(120):
         commanded = braked(commanded, braking)
-        port.FixValue(context, list(commanded))
+        at.set(wheel_speeds=commanded)
         for _ in range(25):
-            context.SetContinuousState(state)
-            state = state + 1e-3 * block.EvalTimeDerivatives(context).CopyToVector()
+            at.state = state
+            state = state + 1e-3 * at.rates()
     return float(state[0])
 
 
@@ -306,8 +306,8 @@ def test_the_disc_holds_the_body_at_any_heading():
     """The body turns about its axle: what stays off the disc is never touched."""
     draw = np.random.default_rng(3)
     for angle, heading, turn in draw.uniform(-math.pi, math.pi, (500, 3)):
-        box = np.array([0.0, 0.0, turn, 0.3, 0.1])
+        box = np.array([0.0, 0.0, turn, 0.3, 0.1, 0.0])
         far = RADIUS + 1e-6 + 0.5 * math.hypot(0.3, 0.1)
         box[:2] = far * math.cos(angle), far * math.sin(angle)
-        body = np.array([0.0, 0.0, heading, 0.35, 0.82])
+        body = np.array([0.0, 0.0, heading, 0.35, 0.82, 0.0])
         assert rectangle_clearance(body, box) >= 0.0

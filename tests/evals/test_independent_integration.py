@@ -15,6 +15,7 @@ import pytest
 
 from diagrams import build_sound_follower, make_simulator
 from diagrams.scenario.scenario import Scenario
+from phonotaxis.testing import Bench
 from systems import (
     ActiveImpedance2017Controller,
     ActiveImpedanceController,
@@ -389,26 +390,19 @@ def test_block_s_acceleration_is_the_force_over_the_mass(law, velocity_term):
         velocity_term=velocity_term,
         attraction=AttractionParameters.model_validate(ATTRACTION),
     )
-    context = block.CreateDefaultContext()
+    at = Bench(block, target_valid=1.0, features=[2.0, 0.0, 0.0])
     theta = np.random.default_rng(3).uniform(-np.pi, np.pi, 2000)
-    block.GetInputPort("target_valid").FixValue(context, np.ones(1))
-    block.GetInputPort("features").FixValue(context, np.array([2.0, 0.0, 0.0]))
     accelerations = []
     for k, heading in enumerate(theta):
         R = rotation(heading)
-        inputs = {
-            "p_WS_estimated": state["p_WS"][k],
-            "collision_vectors_B": np.append(R.T @ state["C"][k], np.zeros(4)),
-            "pose_WB_estimated": np.append(
-                state["p_WP"][k] - R @ [EPSILON, 0.0], heading
-            ),
-            "v_WP": state["v_WP"][k],
-        }
-        for name, value in inputs.items():
-            block.GetInputPort(name).FixValue(context, value)
-        remembered = np.array([2.0, *state["before"][k], 0, 0, 0, 0, 0, 0])
-        context.SetDiscreteState(remembered)
-        accelerations.append(block.GetOutputPort("acceleration_W").Eval(context))
+        at.set(
+            p_WS_estimated=state["p_WS"][k],
+            collision_vectors_B=np.append(R.T @ state["C"][k], np.zeros(4)),
+            pose_WB_estimated=np.append(state["p_WP"][k] - R @ [EPSILON, 0.0], heading),
+            v_WP=state["v_WP"][k],
+        )
+        at.state = [2.0, *state["before"][k], 0, 0, 0, 0, 0, 0]
+        accelerations.append(at.output("acceleration_W"))
     expected = total_force(law, velocity_term, state, theta) / MASS
     np.testing.assert_allclose(accelerations, expected, atol=1e-9, rtol=0)
 

@@ -420,8 +420,8 @@ def test_power_of_the_velocity_term_by_search(studies, law):
 def bodies(scenario):
     """(n, 4) x and y of center, half extents in x and y; none stands askew."""
     found = []
-    for x, y, theta, length, width in (
-        body.rectangle(0.0) for body in scenario.bodies().values()
+    for x, y, theta, length, width, _ in (
+        body.rectangles(0.0)[0] for body in scenario.bodies().values()
     ):
         assert abs(math.sin(2.0 * theta)) < 1e-9
         turned = abs(math.sin(theta)) > 0.5

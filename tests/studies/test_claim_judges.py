@@ -307,17 +307,17 @@ def hits(scenario: str, collisions: int, **mechanisms: int) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("never", "out", "verdict", "shares"),
     [
-        (12, 8, "not shown", "30 % were with one that was never heard, 20 %"),
-        (12, 9, "holds", "30 % were with one that was never heard, 22 %"),
-        (0, 32, "holds", "0 % were with one that was never heard, 80 %"),
+        (12, 8, "not shown", "30 % were with one that gave no echo, 20 %"),
+        (12, 9, "holds", "30 % were with one that gave no echo, 22 %"),
+        (0, 32, "holds", "0 % were with one that gave no echo, 80 %"),
     ],
 )
 def test_most_collisions_are_more_than_half_of_both_scenes(never, out, verdict, shares):
     """8 with one moving obstacle and 32 with two: 40 in all."""
     summary = cells(
-        hits(STATIC, 100, never_heard=100),
-        hits(ONE, 8, heard_late=8),
-        hits(TWO, 32, never_heard=never, out_of_sight=out, pushed_too_little=2),
+        hits(STATIC, 100, no_echo=100),
+        hits(ONE, 8, late_echo=8),
+        hits(TWO, 32, no_echo=never, out_of_sight=out, echo_in_time=2),
     )
     figure, judged = blind(summary)
     assert judged == verdict

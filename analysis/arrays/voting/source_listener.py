@@ -35,7 +35,7 @@ _OVERLAP = 1.5
 
 # Factor for the common error of a row's votes from 45 deg off its normal. The value is
 # from simulated rooms.
-_OF_ROWS = 4.0
+_OF_ROWS = 3.0
 
 
 class ListenerParameters(Parameters):

@@ -14,7 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.steered_response import SearchGrid, steered_response
+from analysis.arrays.steered_response import (
+    SearchGrid,
+    centroid_delays,
+    steered_response,
+)
+from analysis.arrays.voting.vote_bearings import wrapped
 from systems.sound.array_shape import ArrayShape
 
 # _LEAST_SHARE: least height of a peak, as a share of the highest peak.
@@ -42,6 +47,8 @@ class SteeredSearch:
     """
 
     shape: ArrayShape
+    c: float
+    """Speed of sound, m/s."""
     grid: SearchGrid
     bins: slice
     """Bins of the spectra to use."""
@@ -68,7 +75,7 @@ class SteeredSearch:
         if "elevation" in shape.angles:
             elevation = np.arctan2(p[:, 2], level)
         bins = slice(math.ceil(low * window_s), math.floor(high * window_s) + 1)
-        return cls(shape, grid, bins, azimuth, elevation, level / range_m)
+        return cls(shape, c, grid, bins, azimuth, elevation, level / range_m)
 
     def votes(
         self, spectra: NDArray[np.complex64]
@@ -95,7 +102,8 @@ class SteeredSearch:
         noise = 1.0 / math.sqrt(2.0 * (self.shape.count - 1) * values)
         least = max(_DEVIATIONS * noise, _LEAST_RESPONSE)
         peaks = self._peaks(response, least)
-        return self.azimuth[peaks], self.elevation[peaks], response[peaks]
+        azimuth = self.azimuth[peaks] + self._turns(peaks, correlations)
+        return wrapped(azimuth), self.elevation[peaks], response[peaks]
 
     def _peaks(self, response: NDArray[np.float64], least: float) -> NDArray[np.int64]:
         """Returns the positions of the highest peaks whose bearings differ enough."""
@@ -118,6 +126,34 @@ class SteeredSearch:
             found.append(best)
             left[near] = -1.0
         return np.array(found, dtype=np.int64)
+
+    def _turns(
+        self, peaks: NDArray[np.int64], correlations: NDArray[np.float32]
+    ) -> NDArray[np.float64]:
+        """Returns by how much the response is greatest beside each position, rad.
+
+        Otherwise, all votes for a source at rest would have the same error, up to half
+        a step of the grid. The maximum is that of a parabola through three azimuths.
+        """
+        grid, step = self.grid, self.grid.angle_rad
+        places = np.tile(grid.p_AS[peaks], (3, 1))
+        turn = np.repeat(step * np.arange(-1.0, 2.0), len(peaks))
+        x, y = places[:, 0].copy(), places[:, 1].copy()
+        places[:, 0] = np.cos(turn) * x - np.sin(turn) * y
+        places[:, 1] = np.sin(turn) * x + np.cos(turn) * y
+        inverse_range = np.tile(grid.inverse_range[peaks], 3)
+        later = centroid_delays(places, inverse_range, self.shape, self.c)
+        i, j = self.shape.pairs.T
+        lags = grid.lag_rate_hz * (later[:, j] - later[:, i]) + grid.max_lag
+        lags = np.clip(lags, 0.0, correlations.shape[1] - 1.000001)
+        below, pair = lags.astype(np.int64), np.arange(len(i))
+        above = lags - below
+        values = correlations[pair, below] * (1.0 - above)
+        values += correlations[pair, below + 1] * above
+        before, here, after = values.sum(axis=1).reshape(3, -1)
+        bend = before - 2.0 * here + after
+        off = 0.5 * (before - after) / np.where(bend < 0.0, bend, -np.inf)
+        return np.asarray(step * np.clip(off, -1.0, 1.0))
 
     def _apart(self, k: int) -> NDArray[np.float64]:
         """Returns the horizontal distances of all directions from direction k."""

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from analysis.arrays.voting.vote_peaks import VotedSource, wrapped
+from analysis.arrays.voting.vote_bearings import wrapped
+from analysis.arrays.voting.vote_peaks import VotedSource
 from systems.framework.parameters import Fraction, Parameters, Positive
 
 #: Largest distance of a detection from its track, in standard deviations.

@@ -11,19 +11,22 @@ densities, but at different directions.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.voting.steep_votes import SteepVotes, steep_votes, without_steep
+from analysis.arrays.voting.vote_bearings import (
+    KERNEL_RAD,
+    LEAST_STD_RAD,
+    NEAR_RAD,
+    voted_bearing,
+    wrapped,
+)
 from analysis.arrays.voting.vote_records import DirectionVotes
 
 _CELLS = 360
-
-# Standard deviation of the von Mises kernel, rad. A wider kernel merges talkers, and a
-# narrower kernel splits them.
-_KERNEL_RAD = math.radians(4.5)
 
 # _LEAST_HEIGHT: least height of a peak, as a share of the highest peak.
 # _LEAST_PROMINENCE: least height of a peak above the higher of the two adjacent
@@ -39,9 +42,8 @@ _LEAST_SHARE = 0.17
 #   source that has few votes in one of the two densities.
 _OF_BINS, _ANYWHERE = 0.6, 0.1
 
-# _LEAST_VOTES: least number of single bins that vote for a source.
-# _NEAR_RAD: largest distance of these votes from the peak, rad.
-_LEAST_VOTES, _NEAR_RAD = 15.0, math.radians(12.0)
+# Least number of single bins that vote for a source.
+_LEAST_VOTES = 15.0
 
 # Factor for the least number of bins if the steered response also votes.
 _AGREED = 0.5
@@ -52,13 +54,6 @@ _LEAST_STEERED = 3
 # Largest number of votes of a source that count as independent.
 _INDEPENDENT = 30.0
 
-# Error that reflections cause in all votes together, per square of the scatter of the
-# votes, 1/rad. Both this error and the square of the scatter are proportional to the
-# power of the reflections. The value is from simulated rooms with reverberation times
-# of 0.2-0.6 s.
-_COMMON = 3.0
-_LEAST_STD_RAD = math.radians(0.5)
-
 # _RATES: rates of bearings to try, rad/s. Neighbors turn the votes of half a second by
 #   less than the width of the kernel.
 # _TURNS: least height of the highest peak at a rate, as a multiple of that at rest. Two
@@ -68,8 +63,6 @@ _TURNS = 2.2
 
 # Standard deviation of Gaussian values over the median of their magnitudes.
 _MAD_TO_STD = 1.4826
-
-_STEPS = 4
 
 # _MOSTLY_STEADY: mean of how far the votes stand out from steady sound, below which
 #   steady sound such as that of a fan has most of the votes, though a talker may be
@@ -200,7 +193,7 @@ def _steep_source(
     return VotedSource(
         bearing=steep.bearing,
         bearing_std=math.hypot(
-            std, _LEAST_STD_RAD / max(math.cos(steep.elevation), 0.01)
+            std, LEAST_STD_RAD / max(math.cos(steep.elevation), 0.01)
         ),
         elevation=steep.elevation,
         elevation_std=_scatter(votes.elevation[chosen]),
@@ -227,7 +220,7 @@ def _level_sources(
     found = []
     nearest = peaks[np.argmax(np.cos(azimuth[:, None] - centers[peaks]), axis=1)]
     for peak in peaks:
-        source = _source(votes, centers[peak], nearest == peak, whole)
+        source = _source(votes, steered, centers[peak], nearest == peak, whole)
         if source is not None:
             height = float(density[peak] / density.max())
             sure = min(1.0, source.votes / (3.0 * least))
@@ -242,7 +235,7 @@ def _density(
     cells = np.floor((azimuth + math.pi) / (2.0 * math.pi) * _CELLS).astype(int)
     histogram = np.bincount(cells % _CELLS, weight, _CELLS)
     centers = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
-    kernel = np.exp((np.cos(centers - centers[0]) - 1.0) / _KERNEL_RAD**2)
+    kernel = np.exp((np.cos(centers - centers[0]) - 1.0) / KERNEL_RAD**2)
     smooth = np.fft.irfft(np.fft.rfft(histogram) * np.fft.rfft(kernel), _CELLS)
     density = np.maximum(smooth, 0.0) / smooth.sum()
     return density + _ANYWHERE / _CELLS, centers
@@ -263,6 +256,7 @@ def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:
 
 def _source(
     votes: DirectionVotes,
+    steered: DirectionVotes | None,
     bearing: float,
     nearest: NDArray[np.bool_],
     whole: float,
@@ -273,41 +267,28 @@ def _source(
     response has a peak there.
     """
     azimuth, weight = votes.azimuth, votes.weight
-    near = np.abs(wrapped(azimuth - bearing)) < _NEAR_RAD
+    near = np.abs(wrapped(azimuth - bearing)) < NEAR_RAD
     count = int(np.count_nonzero(near))
     mine = near & nearest
     if not mine.any():
         return None
-    a, w = azimuth[mine], weight[mine]
-    for _ in range(_STEPS):
-        off = wrapped(a - bearing)
-        pull = w * np.exp((np.cos(off) - 1.0) / _KERNEL_RAD**2)
-        bearing += math.atan2(float(pull @ np.sin(off)), float(pull @ np.cos(off)))
-    off = wrapped(a - bearing)
-    spread = math.sqrt(float(w @ off**2) / float(w.sum()))
-    std = spread / math.sqrt(min(float(a.size), _INDEPENDENT))
-    common = _COMMON * spread**2
+    found = voted_bearing(votes.part(mine, slice(0)), steered, bearing)
     heights = votes.elevation[mine]
     measured = bool(np.isfinite(heights).all())
     return VotedSource(
-        bearing=float(wrapped(bearing)),
-        bearing_std=math.hypot(std, _LEAST_STD_RAD, common),
+        bearing=found.bearing,
+        bearing_std=found.std,
         elevation=float(np.median(heights)) if measured else None,
         elevation_std=_scatter(heights) if measured else None,
-        share=float(w.sum()) / whole,
+        share=float(weight[mine].sum()) / whole,
         power=float(votes.power[mine].sum()),
         rises=float(votes.rises[mine].mean()),
         votes=count,
         confidence=0.0,
-        common_std=common,
+        common_std=found.common_std,
     )
 
 
 def _scatter(angles: NDArray[np.float64]) -> float:
     off = np.abs(angles - np.median(angles))
-    return max(_LEAST_STD_RAD, _MAD_TO_STD * float(np.median(off)))
-
-
-def wrapped(angle: Any) -> Any:
-    """Wraps an angle or an array of angles to (-pi, pi], rad."""
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+    return max(LEAST_STD_RAD, _MAD_TO_STD * float(np.median(off)))

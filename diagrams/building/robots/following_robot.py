@@ -25,7 +25,7 @@ def following_blocks(
     scenario: Scenario,
     controller: Any,
     *,
-    bodies: int,
+    owners: Sequence[int],
     others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
@@ -34,7 +34,8 @@ def following_blocks(
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
         controller: The controller block of the robot's law.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
+        owners: Number of the body of each rectangle in the inputs ``poses_WO`` and
+            ``sizes``, ascending from 0.
         others: Names of the sources and loudspeakers that the robot does not follow.
         seed_of: Function that returns the random seed of a block from its name.
 
@@ -50,7 +51,7 @@ def following_blocks(
     return [
         *_hearing(scenario, robot, others, seed_of),
         _tracker(scenario, robot),
-        *_obstacle_sensing(scenario, robot, bodies, seed_of, mapped=mapped),
+        *_obstacle_sensing(scenario, robot, owners, seed_of, mapped=mapped),
     ]
 
 
@@ -131,7 +132,7 @@ def _inputs(block: Any) -> list[str]:
 def _obstacle_sensing(
     scenario: Scenario,
     robot: Follower,
-    bodies: int,
+    owners: Sequence[int],
     seed_of: Callable[[str], int],
     *,
     mapped: bool,
@@ -139,13 +140,14 @@ def _obstacle_sensing(
     seen: dict[str, Any] = {
         "robot": robot.robot,
         "source_size": scenario.source_size,
-        "obstacle_count": bodies,
+        "obstacle_count": len(owners),
     }
     if robot.obstacle_sensing == "ideal":
         return [
             IdealObstacleSensor(
                 maximum_range_m=robot.ultrasonic.maximum_range_m,
                 all_bodies=robot.collision_vector.aggregation == "sum",
+                owners=owners,
                 **seen,
             )
         ]

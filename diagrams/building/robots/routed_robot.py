@@ -59,7 +59,7 @@ def trajectory_command(scenario: Scenario) -> Any | None:
 def routed_blocks(
     scenario: Scenario,
     *,
-    bodies: int,
+    owners: Sequence[int],
     robots: Sequence[int],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
@@ -67,8 +67,9 @@ def routed_blocks(
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
-        robots: Indices of those bodies that are robots.
+        owners: Number of the body of each rectangle in the inputs ``poses_WO`` and
+            ``sizes``, ascending from 0.
+        robots: Numbers of those bodies that are robots.
         seed_of: Function that returns the random seed of a block from its name.
 
     Returns:
@@ -88,14 +89,14 @@ def routed_blocks(
             tick_s=tick_s,
         ),
         PathTarget(parameters=router.route, robot=robot, tick_s=tick_s),
-        *_seen_objects(scenario, bodies, robots, seed_of),
+        *_seen_objects(scenario, owners, robots, seed_of),
         *_adaptation(scenario),
     ]
 
 
 def _seen_objects(
     scenario: Scenario,
-    bodies: int,
+    owners: Sequence[int],
     robots: Sequence[int],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
@@ -106,7 +107,8 @@ def _seen_objects(
             IdealObjectSensor(
                 parameters=router.objects,
                 robot=robot,
-                bodies=bodies,
+                bodies=len(owners),
+                owners=owners,
                 robots=robots,
                 seed=seed_of("ideal_object_sensor"),
                 tick_s=tick_s,
@@ -120,7 +122,7 @@ def _seen_objects(
             assumed_sound_speed_m_s=router.assumed_sound_speed_m_s,
             robot=robot,
             source_size=None,
-            obstacle_count=bodies,
+            obstacle_count=len(owners),
             seed=seed_of("ultrasonic_array"),
             tick_s=tick_s,
         ),

@@ -54,7 +54,7 @@ def search_command(scenario: Scenario) -> Any:
 def searching_blocks(
     scenario: Scenario,
     *,
-    bodies: int,
+    owners: Sequence[int],
     others: Sequence[str],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
@@ -62,7 +62,8 @@ def searching_blocks(
 
     Args:
         scenario: Scenario of this robot alone, see ``Scenario.of_robot``.
-        bodies: Number of bodies in the inputs ``poses_WO`` and ``sizes``.
+        owners: Number of the body of each rectangle in the inputs ``poses_WO`` and
+            ``sizes``, ascending from 0.
         others: Names of the sources and loudspeakers for which the robot does not
             search.
         seed_of: Function that returns the random seed of a block from its name.
@@ -77,14 +78,14 @@ def searching_blocks(
     )
     heading = HeadingController(tick_s=tick_s)
     if isinstance(robot, OdorSearcher):
-        return [compass, heading, *_smell(scenario, robot, bodies, seed_of)]
+        return [compass, heading, *_smell(scenario, robot, owners, seed_of)]
     return [compass, heading, *_ears(scenario, robot, others, seed_of)]
 
 
 def _smell(
     scenario: Scenario,
     robot: OdorSearcher,
-    bodies: int,
+    owners: Sequence[int],
     seed_of: Callable[[str], int],
 ) -> list[Any]:
     tick_s = scenario.tick_s
@@ -103,7 +104,8 @@ def _smell(
         ContactSwitches(
             faults=robot.faults,
             robot=robot.robot,
-            bodies=bodies,
+            bodies=len(owners),
+            owners=owners,
             source_size=CONTAINER_M,
             tick_s=tick_s,
         ),

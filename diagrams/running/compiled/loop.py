@@ -97,12 +97,8 @@ class CompiledLoop:
             self._call(1, 1)
         # numba raises different errors for different unsupported features.
         except (NumbaError, NotImplementedError, ValueError) as error:
-            own = [
-                text
-                for robot in self.referee.scenario.robots.values()
-                for text in (robot.law, *robot.blocks)
-                if ":" in text
-            ]
+            robots = self.referee.scenario.robots.values()
+            own = [name for robot in robots for name in robot.own_code]
             if not own:
                 raise
             raise InputError(

@@ -13,7 +13,7 @@ from pydrake.systems.framework import Diagram, PortDataType
 from diagrams.building.builder import audible_sounds, robot_of
 from diagrams.building.robot import columns_of, make_source, make_world, parts_of
 from diagrams.building.world_blocks import radio_nodes
-from diagrams.scenario.own_code import loaded_digests
+from diagrams.scenario.own_versions import loaded_digests
 from diagrams.scenario.participants import Router
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import RunFacts, Step
@@ -225,13 +225,13 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
         if own.only.blocks:  # a user's block may depend on the whole scenario
             blocks[name] = LoopBlocks(made())
             continue
-        bodies = len(scenario.surroundings(name).obstacles)
+        owners = scenario.surroundings(name).owners
         target = scenario.target(name)
         others = [sound for sound in scenario.sounds() if sound != target]
         robots = scenario.robots_seen(name)
         made_from, code = _made_from(own), loaded_digests(own)
         heard = name in audible_sounds(scenario), scenario.longest_frame_s
-        key = f"{name} {bodies} {robots} {others} {heard} {code} {made_from}"
+        key = f"{name} {owners} {robots} {others} {heard} {code} {made_from}"
         blocks[name] = _shared(key, made)
     return blocks
 

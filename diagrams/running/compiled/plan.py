@@ -142,25 +142,32 @@ class LoopPlan:
             around: The bodies that the robot can see and hit.
         """
         values, robots, times = self._robots[name].values, self._robots, self._times
-        everything = {**around.bodies, around.target: around.followed}
-        wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
+        wanted = {
+            "pose_WS": {around.target: around.followed},
+            "poses_WO": around.obstacles,
+        }
         for port, bodies in wanted.items():
             if ("", port) in values:
                 into = values["", port]
-                # Bodies on known paths, by the index of their pose in the port.
-                known = {3 * k: b for k, b in enumerate(bodies) if b not in robots}
-                paths = [everything[body].path for body in known.values()]
-                at = times if any(path.moves for path in paths) else times[:1]
-                places = np.array([*known], dtype=np.int64)
-                poses = np.reshape([path.poses(at) for path in paths], (-1, len(at), 3))
-                self._fill_by(fill, into, places, poses)
-                for k, body in enumerate(bodies):
-                    if body in robots:
-                        pose = robots[body].values["plant", "pose_WB"]
-                        self._fill_by(copy, into, 3 * k, pose)
+                known = [body for name, body in bodies.items() if name not in robots]
+                moves = any(body.path.moves for body in known)
+                places: list[int] = []
+                at, tables, begin = times if moves else times[:1], [], 0
+                for other, body in bodies.items():
+                    # A body has one pose in the port per rectangle.
+                    end = begin + 3 * len(body.shape.rectangles)
+                    if other in robots:
+                        pose = robots[other].values["plant", "pose_WB"]
+                        self._fill_by(copy, into, begin, pose)
+                    else:
+                        places += range(begin, end, 3)
+                        tables.append(body.rectangles_over(at)[..., :3])
+                    begin = end
+                poses = np.concatenate([np.empty((0, len(at), 3)), *tables])
+                self._fill_by(fill, into, np.array(places, dtype=np.int64), poses)
         if ("", "sizes") in values:
-            sizes = [body.size for body in around.obstacles.values()]
-            values["", "sizes"][:] = np.ravel(sizes)
+            sizes = [body.shape.rectangles[:, 3:] for body in around.obstacles.values()]
+            values["", "sizes"][:] = np.concatenate([np.empty((0, 3)), *sizes]).ravel()
 
     def _fill_by(self, function: Any, *values: Any) -> None:
         """Adds a part that fills a port by a function of values and the tick."""

@@ -183,6 +183,12 @@ def _compilable(function: FunctionType) -> Any:
     own modules.
     """
     plain = inspect.unwrap(function)
+    if not isinstance(plain, FunctionType):
+        raise InputError(
+            "engine",
+            f"{shortened(repr(plain), 60)} is not a function, and numba compiles only "
+            "functions; write it as one, or run with engine drake",
+        )
     for called in _users_helpers(plain, set()):
         register_jitable(called)
     return register_jitable(plain)
@@ -198,7 +204,8 @@ def _users_helpers(
         called = function.__globals__.get(name)
         if not isinstance(called, FunctionType) or called in {function, *known}:
             continue
-        if digests_of(sys.modules[called.__module__]):
+        module = sys.modules.get(called.__module__)
+        if called.__module__ == "__main__" or (module and digests_of(module)):
             known.add(called)
             _users_helpers(called, known)
     return known

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import combinations
 
+from diagrams.scenario.bodies import Body
 from diagrams.scenario.participants import Robot, Router
 from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
+from systems.world.parameters import ObstacleParameters
 from systems.world.plane import control_point
 
 
@@ -48,6 +50,35 @@ def check_goals(robots: Mapping[str, Robot], farthest_m: float) -> None:
                 "robot's goal, too near for both bodies; move one of them by "
                 f"{least:.3g} m or more",
             )
+
+
+def check_filled_goals(
+    robots: Mapping[str, Robot], obstacles: Iterable[ObstacleParameters]
+) -> None:
+    """Raises an error if the goal of a route is inside a polygon.
+
+    The planner of routes knows only the edges of polygons.
+
+    Args:
+        robots: Robots of the scenario, by name.
+        obstacles: Obstacles of the scenario.
+
+    Raises:
+        InputError: A goal is inside a known obstacle at rest with ``polygon_m``.
+    """
+    for name, robot in robots.items():
+        if not isinstance(robot, Router):
+            continue
+        goal = robot.route.goal_m
+        for obstacle in obstacles:
+            at_rest = obstacle.known and not obstacle.path().moves
+            body = Body(obstacle.path(), obstacle.shape())
+            if at_rest and body.fills(goal, 0.0):
+                raise InputError(
+                    f"robots.{name}.route.goal_m",
+                    f"({goal[0]:g}, {goal[1]:g}) is inside {obstacle.name!r}; move one "
+                    "of them",
+                )
 
 
 def _start(robot: Robot) -> tuple[float, float]:

@@ -18,7 +18,6 @@ from systems.safety.views import (
     sensor_sectors,
     stopping_way,
 )
-from systems.world.plane import beyond_rectangle
 
 
 def check_guard(
@@ -56,7 +55,7 @@ def check_guard(
     _check_memory(prefix, robot, guard, tick_s)
     x, y = robot.start.position_m
     for name, body in bodies.items():
-        distance = math.hypot(*beyond_rectangle((x, y), body.rectangle(0.0)))
+        distance = body.distance((x, y), 0.0)
         if distance < START_BUBBLE_M:
             raise InputError(
                 f"{prefix}start.position_m",

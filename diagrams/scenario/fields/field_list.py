@@ -72,7 +72,9 @@ def fields_of_law(fields: Iterable[Field], law: str, kind: str) -> list[Field]:
     ]
 
 
-def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
+def find_fields(
+    schema: Mapping[str, Any], pattern: str, own: Iterable[Field] = ()
+) -> list[Field]:
     """Finds fields of a scenario by their path or meaning.
 
     Fields with a matching path come first. Case does not matter.
@@ -82,6 +84,7 @@ def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
         pattern: A part of the path or meaning. A pattern with a wildcard (``*``, ``?``
             or ``[...]``) must match the whole path or a part of the meaning. An empty
             pattern matches all fields.
+        own: Further fields, which precede those of the schema.
 
     Returns:
         One or more fields.
@@ -89,7 +92,7 @@ def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
     Raises:
         InputError: No field matches.
     """
-    every, wanted = list(list_fields(schema)), pattern.casefold()
+    every, wanted = [*own, *list_fields(schema)], pattern.casefold()
     if any(each in wanted for each in "*?["):
         by_path = [f for f in every if fnmatchcase(f.path.casefold(), wanted)]
     else:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from diagrams.scenario.fields.schema_walk import at_place, leaf_paths
-from diagrams.scenario.suggestions import did_you_mean
+from diagrams.scenario.suggestions import nearest
 
 #: Groups of synonyms with different letters; scenarios use one word of each group.
 _SAME_THING = (
@@ -14,10 +14,45 @@ _SAME_THING = (
     ("size", "dimensions", "extent", "extents"),
     ("speed", "velocity"),
     ("heading", "angle", "yaw", "orientation", "theta"),
+    ("top", "max", "maximum", "largest", "highest"),
+    ("min", "minimum", "least", "smallest", "lowest"),
 )
+#: Groups of synonyms that need a second word: the top speed is not the top of a body.
+_LIMITS = _SAME_THING[-2:]
+#: Fields by other names: symbols of the papers, and words of other programs.
+_OTHER_NAMES = {
+    "k_r": "attraction.stiffness_n_m",
+    "d_r": "attraction.damping_n_s_m",
+    "walls": "obstacles",
+    "boxes": "obstacles",
+    "objects": "obstacles",
+    "gains": "laws",
+    "time": "duration_s",
+    "t_end": "duration_s",
+    "dt": "tick_s",
+    "timestep": "tick_s",
+    "controller": "law",
+    "seeds": "seed",
+    "random_seed": "seed",
+    "sensors": "ultrasonic.sensors",
+    "sonar": "ultrasonic",
+    "mics": "robot.microphones_m",
+    "positions_m": "robot.microphones_m",
+    "speaker": "source",
+    "target": "source",
+    "leader": "source",
+    "initial_pose": "start",
+    "temperature": "sound_speed_m_s",
+    "temperature_c": "sound_speed_m_s",
+    "t60": "room.reverberation_time_s",
+    "rt60": "room.reverberation_time_s",
+}
 
 #: Groups whose fields users change most.
-_USUAL = ("source", "robot", "obstacles", "attraction", "room", "microphones")
+_USUAL = (
+    *("source", "robot", "start", "obstacles", "attraction", "room", "microphones"),
+    "ultrasonic",
+)
 
 
 def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
@@ -27,25 +62,36 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
 
     1. a field in the same group with this name and a unit
     2. a field in the same group with the same meaning
-    3. a field in a lower group with this name, with or without a unit
-    4. a field anywhere with this name, with or without a unit
-    5. a field in the same group with a similar name
+    3. a field with a symbol of the papers, or a group with another name
+    4. a field in a lower group with this name, with or without a unit
+    5. a field anywhere with this name, with or without a unit, if the group of the
+       unknown field does not exist or is the whole scenario
+    6. a field in the same group with a similar name
 
     Args:
         schema: JSON Schema of the whole data.
         place: Parts of the path of the unknown field.
 
     Returns:
-        A text for the error message, empty if there is no such field.
+        Path of the field, empty if there is no such field.
     """
     *parents, last = place
+    if "/" in last:
+        *parents, last = place = [*parents, *last.split("/")]
+        if last in at_place(schema, parents):
+            return ".".join(place)
     siblings = list(at_place(schema, parents))
-    return (
-        _meant(each for each in siblings if each.startswith(f"{last}_"))
+    found = (
+        next((each for each in siblings if each.startswith(f"{last}_")), "")
         or _of_that_meaning(last, siblings)
-        or _elsewhere(schema, place)
-        or did_you_mean(last, siblings)
+        or _other_name(schema, last)
     )
+    if found:
+        return found if "." in found else ".".join([*parents, found])
+    if parents and siblings:
+        near = nearest(last, siblings)
+        return _below(schema, place) or (near and ".".join([*parents, near]))
+    return next(iter(fields_called(schema, last)), "") or nearest(last, siblings)
 
 
 def fields_called(schema: Mapping[str, Any], name: str) -> list[str]:
@@ -66,29 +112,28 @@ def fields_called(schema: Mapping[str, Any], name: str) -> list[str]:
     return [".".join(path) for path in sorted(found, key=rank)]
 
 
-def _meant(names: Iterable[str]) -> str:
-    found = next(iter(names), "")
-    return f" (did you mean {found!r}?)" if found else ""
-
-
 def _of_that_meaning(name: str, siblings: Iterable[str]) -> str:
-    """Suggests a field of the same group with the same meaning, whatever its unit."""
+    """Finds a field of the same group with the same meaning, whatever its unit."""
+    first, _, rest = name.casefold().partition("_")
+    for alike in _SAME_THING:
+        for field in siblings if first in alike else ():
+            other, _, more = field.casefold().partition("_")
+            if other in alike and (alike not in _LIMITS or more.startswith(rest)):
+                return field
+    return ""
 
-    def told(field: str) -> str:
-        return field.casefold().partition("_")[0]
 
-    alike = next((words for words in _SAME_THING if told(name) in words), ())
-    return _meant(field for field in siblings if told(field) in alike)
+def _other_name(schema: Mapping[str, Any], name: str) -> str:
+    path = _OTHER_NAMES.get(name.casefold(), "")
+    return path if path.partition(".")[0] in schema.get("properties", {}) else ""
 
 
-def _elsewhere(schema: Mapping[str, Any], place: Sequence[str]) -> str:
-    """Suggests a field elsewhere with this name, or with this name and a unit."""
+def _below(schema: Mapping[str, Any], place: Sequence[str]) -> str:
+    """Finds a field in a lower group with this name, or with this name and a unit."""
     *parents, name = place
     below = [
         (*parents, *path)
         for path in leaf_paths(schema, parents)
         if path[-1] == name or path[-1].startswith(f"{name}_")
     ]
-    if parents and below:
-        return _meant([min(map(".".join, below), key=len)])
-    return _meant(fields_called(schema, name))
+    return min(map(".".join, below), key=len, default="")

@@ -9,6 +9,8 @@ from diagrams.scenario.scenario import Scenario
 from systems.base.driven_path import DrivenPath
 from systems.base.robot import body_radius
 from systems.world.paths import WaypointPath
+from systems.world.plane import rectangle_corners
+from systems.world.shapes import Shape, box
 
 
 def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
@@ -26,26 +28,28 @@ def corner_speeds(scenario: Scenario, robot: str) -> dict[str, float]:
     """
     until = scenario.duration_s
     speeds = {
-        each.name: _corner_speed(each.path(), each.size_m, until)
+        each.name: _corner_speed(each.path(), each.shape(), until)
         for each in scenario.obstacles
     }
     for name, source in scenario.sources.items():
         if source.body:
-            size = source.length_m, source.width_m
-            speeds[name] = _corner_speed(source.path(), size, until)
+            shape = box((source.length_m, source.width_m))
+            speeds[name] = _corner_speed(source.path(), shape, until)
     for name, other in scenario.robots.items():
         if name != robot:
             speeds[name] = _reachable_speed(other)
     return speeds
 
 
-def _corner_speed(
-    path: WaypointPath | DrivenPath, size: tuple[float, float], until: float
-) -> float:
-    """Greatest corner speed, m/s, of a rectangle on a path until a time, s."""
-    length, width = size
+def _corner_speed(path: WaypointPath | DrivenPath, shape: Shape, until: float) -> float:
+    """Greatest corner speed, m/s, of a shape on a path until a time, s.
+
+    A corner counts on both sides of the path, whatever the direction of the turn. A
+    round corner moves as its center does: its outline does not change if it turns.
+    """
     ahead, turn = np.abs(path.extreme_twists(until)).T
-    corners = np.hypot(ahead + 0.5 * width * turn, 0.5 * length * turn)
+    x, y = np.abs(np.concatenate([*map(rectangle_corners, shape.rectangles)])).T
+    corners = np.hypot(ahead + np.multiply.outer(y, turn), np.multiply.outer(x, turn))
     return float(np.max(corners, initial=0.0))
 
 

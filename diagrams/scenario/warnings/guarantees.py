@@ -29,7 +29,6 @@ from systems.safety.views import (
     stopping_way,
     unseen_approach,
 )
-from systems.world.plane import beyond_rectangle
 
 #: Time that the wheels take to stop after the command is 0, in motor lags.
 _LAGS = 6.0
@@ -262,10 +261,7 @@ def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
 def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
     """Returns assumption A3: no body is within the start bubble."""
     place = scenario.only.start.position_m
-    nearest = min(
-        (math.hypot(*beyond_rectangle(place, body.rectangle(0.0))) for body in bodies),
-        default=math.inf,
-    )
+    nearest = min((body.distance(place, 0.0) for body in bodies), default=math.inf)
     field, text = "start.position_m", "nearest body at the start"
     return Assumption(
         "A3", text, nearest, START_BUBBLE_M, "m", at_least=True, field=field

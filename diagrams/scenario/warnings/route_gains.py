@@ -164,8 +164,8 @@ def goal_warnings(
     Args:
         prefix: Prefix of the robot's fields in messages.
         robot: A robot on a route.
-        resting: Rectangle of each obstacle at rest, by name: (x, y, theta, length,
-            width) in the world frame W, m and rad.
+        resting: (n, 6) rectangles (x, y, theta, length, width, radius) of each obstacle
+            at rest, by name, in the world frame W, m and rad.
         margin_m: ``stop.goal_margin_m``, the permitted distance from the goal, m.
 
     Returns:
@@ -182,8 +182,9 @@ def goal_warnings(
     for _ in range(_STEPS):
         # Force on P, and the obstacles that push it.
         force, pushing = pull * (goal - p), []
-        for name, each in resting.items():
-            away = np.array(rotate(each[2], *beyond_rectangle(p, each)))
+        for name, rows in resting.items():
+            ways = [np.array(rotate(row[2], *beyond_rectangle(p, row))) for row in rows]
+            away = min(ways, key=lambda way: math.hypot(*way))
             distance = math.hypot(*away)
             if 0.0 < distance < zone_m:
                 force += push * (zone_m - distance) / distance * away

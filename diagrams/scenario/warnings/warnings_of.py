@@ -12,6 +12,7 @@ from diagrams.scenario.bodies import Body
 from diagrams.scenario.participants import Router
 from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.shorthand import field_in
+from diagrams.scenario.warnings.angles import angle_warnings
 from diagrams.scenario.warnings.guarantees import assumptions
 from diagrams.scenario.warnings.route_gains import goal_warnings, route_warnings
 from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
@@ -21,17 +22,27 @@ from systems.world.plane import beyond_rectangle, control_point
 def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
     """Returns the warnings about a scenario that can still be run.
 
-    For each robot, the function warns in these cases:
+    The function warns in these cases:
 
+    - A heading in degrees looks like one in radians.
     - The scenario violates an assumption of the theorems about the robot's guard.
     - The control point P starts nearer to a known obstacle than the clearance of the
       robot's route.
     - The robot cannot come to rest with its gains, or can hit obstacles.
     - Obstacles at rest keep the robot away from its goal.
+    - A robot has gains of the user's own law, but another law.
     """
-    found: list[ScenarioWarning] = []
+    found = [*angle_warnings(scenario)]
     for name, robot in scenario.robots.items():
         prefix = field_in("robots", name, "")
+        if robot.own_gains and not robot.own_code:
+            found.append(
+                ScenarioWarning(
+                    f"{prefix}own_gains.{next(iter(robot.own_gains))}",
+                    f"has no effect, because the law {robot.law!r} is not your own; "
+                    "runs that differ only in this gain are equal",
+                )
+            )
         if robot.own_guard is not None:
             found += (
                 ScenarioWarning(f"{prefix}{each.field}", each.complaint)
@@ -47,9 +58,9 @@ def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
 
 
 def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
-    """Rectangles in W of the obstacles at rest, by name."""
+    """(n, 6) rectangles in W of the obstacles at rest, by name."""
     return {
-        each.name: Body(each.path(), each.size_m).rectangle(0.0)
+        each.name: Body(each.path(), each.shape()).rectangles(0.0)
         for each in scenario.obstacles
         if not each.path().moves
     }
@@ -61,8 +72,7 @@ def _of_the_start(
     """Warns if the control point P starts too near to a known obstacle.
 
     The limit is the clearance of the robot's route. ``known`` contains the known
-    obstacles as (k, 5) rectangles (x, y, theta, length, width) in the world frame W, m
-    and rad.
+    obstacles as (k, 6) rectangles in the world frame W, m and rad.
     """
     place = control_point(robot.start.pose, robot.robot.control_point_m)
     off = (math.hypot(*beyond_rectangle(place, each)) for each in known)

@@ -14,8 +14,13 @@ from numpy.typing import NDArray
 
 from analysis.arrays.array_geometry import ArrayGeometry
 from phonotaxis import locate
-from studies.support.faulty_recordings import Setting, off_by_deg
-from studies.support.hearing_cases.case import CLAIM, HearingCase, Outcome
+from studies.support.faulty_recordings import Setting
+from studies.support.hearing_cases.case import (
+    HearingCase,
+    Outcome,
+    claims_elsewhere,
+    is_near,
+)
 
 TITLE = "dead channels"
 
@@ -66,7 +71,7 @@ def _clap(name: str, place: int, t60_s: float) -> tuple[NDArray[np.float64], Set
 
 
 def _sound_one(name: str, place: int, t60_s: float) -> Outcome:
-    """A recording in order is not refused, and its bearing is right, or flagged."""
+    """A recording in order is not refused, and its bearing is right."""
     samples, setting = _clap(name, place, t60_s)
     geometry = ArrayGeometry(
         microphones=tuple(map(tuple, setting.places.tolist())), temperature_c=20.0
@@ -87,13 +92,8 @@ def _sound_one(name: str, place: int, t60_s: float) -> Outcome:
     bearing, std = main["bearing_deg"], main["bearing_std_deg"] or 0.0
     kinds = [fault.kind for fault in result.faults]
     said = f"{bearing} +- {std:.1f} for {truth:.1f}, {kinds}"
-    flagged = bearing is None or "apart" in kinds
-    near = flagged or float(off_by_deg(bearing, truth)) < max(3.0 * std, 5.0)
-    claims = any(
-        heard.confidence > CLAIM and off_by_deg(heard.bearing_deg, truth) > 15.0
-        for heard in result.agreed.sources
-    )
-    return Outcome(near and "dead" not in kinds, said, claims)
+    near = is_near(bearing, std, truth) and "dead" not in kinds
+    return Outcome(near, said, claims_elsewhere(result.agreed.sources, [truth]))
 
 
 def _dead_one(name: str, place: int, t60_s: float, channel: int) -> Outcome:

@@ -45,7 +45,17 @@ ARRAYS = {
     ),
     "circle of 8, 20 cm": _ring(8, 0.1),
 }
-_ROW = np.array([[0.0, y, 0.0] for y in (-0.075, -0.025, 0.025, 0.075)])
+_ROW = "row, 15 cm"
+LIVE_ARRAYS = {
+    "square, 6.5 cm": ARRAYS["square, 6.5 cm"],
+    "square, 12 cm": ARRAYS["square, 12 cm"],
+    "circle of 8, 20 cm": ARRAYS["circle of 8, 20 cm"],
+    _ROW: np.array([[0.0, y, 0.0] for y in (-0.075, -0.025, 0.025, 0.075)]),
+    "circle of 6, 9.3 cm": ARRAYS["circle of 6, 9.3 cm"],
+    "triangle, 10 cm": _ring(3, 0.0577),
+    "tetrahedron, 12 cm": 0.0424
+    * np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]),
+}
 
 
 class RoomRecording(NamedTuple):
@@ -117,11 +127,10 @@ def cases() -> list[HearingCase]:
             (name, t60) for name in ARRAYS for t60 in (0.0, 0.2, 0.3, 0.45, 0.6)
         )
     ]
-    live = ("square, 6.5 cm", "square, 12 cm", "circle of 8, 20 cm", "row, 15 cm")
     found += [
         HearingCase(f"listen, {name}, T60 {t60:g} s", partial(_live, name, t60, seed))
         for seed, (name, t60) in enumerate(
-            (name, t60) for name in live for t60 in (0.0, 0.2, 0.4, 0.6)
+            (name, t60) for name in LIVE_ARRAYS for t60 in (0.0, 0.2, 0.4, 0.6)
         )
     ]
     return found
@@ -156,8 +165,7 @@ def _located(array: str, t60_s: float, seed: int) -> Outcome:
 
 def _live(array: str, t60_s: float, seed: int) -> Outcome:
     """Most bearings are right within two deviations, which stay small."""
-    places = ARRAYS.get(array, _ROW)
-    is_row = array not in ARRAYS
+    places, is_row = LIVE_ARRAYS[array], array == _ROW
     drawn = recorded(
         places,
         t60_s,

@@ -178,7 +178,7 @@ def reciprocal_avoidance_step(
     4. Convert this velocity of the point to speed and yaw rate.
     """
     own, pose, poses, sizes = numbers.own, inputs[4], inputs[5], inputs[6]
-    twist, count = outputs[0], len(inputs[6]) // 2
+    twist, count = outputs[0], len(inputs[6]) // 3
     wanted, bearing = approach(inputs, numbers.follow)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     qx, qy = pose[0] + own.offset_m * c, pose[1] + own.offset_m * s
@@ -191,13 +191,14 @@ def reciprocal_avoidance_step(
             uy = (y - state[3 + 3 * k]) / numbers.tick_s
         for i in range(3):
             state[2 + 3 * k + i] = poses[3 * k + i]
-        if math.hypot(x - qx, y - qy) - sizes[2 * k] > _FARTHEST_M:
+        length, width, radius = sizes[3 * k], sizes[3 * k + 1], sizes[3 * k + 2]
+        if math.hypot(x - qx, y - qy) - length - radius > _FARTHEST_M:
             continue
         relative = x - qx, y - qy, theta
-        half = 0.5 * sizes[2 * k], 0.5 * sizes[2 * k + 1]
+        half = 0.5 * length, 0.5 * width
         velocity = state[0] - ux, state[1] - uy
         nx, ny, offset = avoid_body(
-            relative, half, numbers.radius_m, velocity, own.horizon_s
+            relative, half, numbers.radius_m + radius, velocity, own.horizon_s
         )
         # The bodies do not avoid the robot, so the robot makes the whole change.
         planes[used, 0], planes[used, 1] = nx, ny
@@ -244,7 +245,7 @@ class ReciprocalAvoidanceController(BaselineController):
         robot: Size of the body, and position of the control point P ahead of the axle.
         attraction: ``AttractionParameters``. The block uses only the follow distance.
         gains: ``ReciprocalAvoidanceParameters``.
-        bodies: Number of bodies.
+        bodies: Number of rectangles on the ports ``poses_WO`` and ``sizes``.
         tick_s: Control period, s.
 
     Reference: van den Berg, Guy, Lin and Manocha, Reciprocal n-body collision
@@ -255,8 +256,8 @@ class ReciprocalAvoidanceController(BaselineController):
     inputs = (
         *BaselineController.inputs,
         Port("pose_WB", 3, "m, m, rad"),
-        Port("poses_WO", "3 bodies", "m, m, rad each"),
-        Port("sizes", "2 bodies", "m, m each"),
+        Port("poses_WO", "3 rectangles", "m, m, rad each"),
+        Port("sizes", "3 rectangles", "m, m, m each"),
     )
 
     def __init__(
@@ -280,5 +281,5 @@ class ReciprocalAvoidanceController(BaselineController):
         self.declare(
             Step(reciprocal_avoidance_step, numbers, state),
             tick_s=tick_s,
-            sizes={"bodies": bodies},
+            sizes={"rectangles": bodies},
         )

@@ -114,6 +114,19 @@ def test_range_of_few_estimates_is_none():
     assert result(ROW, most).main_source()["observable"] == ["bearing", "range"]
 
 
+def test_many_estimates_do_not_flood_a_terminal():
+    """The summary is first; rows are evenly spaced, with the first and the last."""
+    many = [estimate(k, 10.0) for k in range(1_000)]
+    lines = locate_text(result(ROW, many)).splitlines()
+    assert len(lines) <= 20
+    assert lines[0].startswith("heard a source in 1000")
+    assert lines[-1].startswith("10 of 1000 estimates; --json prints all of them")
+    times = [float(line.split()[0]) for line in lines[-11:-1]]
+    assert (times[0], times[-1]) == (many[0].t_s, many[-1].t_s)
+    few = locate_text(result(ROW, many[:10])).splitlines()
+    assert len(few) == len(lines) - 1
+
+
 def test_range_that_scatters_by_more_than_is_allowed_is_none():
     """Each is stated to 0.1 m, but they are off by 0.7 m from their median."""
     ranges = [1.3, 2.0, 2.7, 1.3, 2.0, 2.7, 1.3, 2.7]

@@ -81,8 +81,8 @@ def test_mechanisms_are_counted_commonest_first():
         contact_unseen_s=[NAN, 0.0, NAN, NAN, 0.0],
         time_to_goal_s=[1.0, NAN, NAN, NAN, NAN],
     )
-    assert cell.mechanisms == {"heard late": 2, "lost": 1, "never heard": 1}
-    assert next(iter(cell.mechanisms)) == "heard late"
+    assert cell.mechanisms == {"late echo": 2, "lost": 1, "no echo": 1}
+    assert next(iter(cell.mechanisms)) == "late echo"
     assert summarised(cause=["collision"]).mechanisms == {}
 
 

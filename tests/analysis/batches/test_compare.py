@@ -123,7 +123,7 @@ def test_layouts_that_set_what_the_comparison_sets_are_refused(tmp_path):
         ({"scenarios": ["no_such"]}, "scenario"),
         ({"scenarios": ["default", "default"]}, "scenario"),
         ({"runs": 0}, "runs"),
-        ({"seed": "one"}, "seed"),
+        ({"seed": -1}, "seed"),
         ({"settings": ["law=none"]}, "grid.law"),
         ({"settings": ["duration_s"]}, "duration_s"),
         ({"grid": ["hearing=audio"]}, "hearing"),
@@ -135,10 +135,15 @@ def test_mistakes_are_named(words, field):
     assert caught.value.field == field
 
 
+TERM = "collision_vector.velocity_term"
+
+
 def test_velocity_terms_are_set_or_compared():
-    (one,) = comparison_plans(["default"], velocity_terms="closing").values()
-    assert one.set == {"collision_vector.velocity_term": "closing"}
-    (both,) = comparison_plans(["default"], velocity_terms="printed,closing").values()
+    (one,) = comparison_plans(["default"], settings=[f"{TERM}=closing"]).values()
+    assert one.set == {TERM: "closing"}
+    (both,) = comparison_plans(
+        ["default"], settings=[f"{TERM}=printed,closing"]
+    ).values()
     assert len(both.cells()) == 10
 
 

@@ -142,7 +142,10 @@ def flows(boxes: list[Any], radius: float) -> bool:
     )
     free = np.ones(x.shape, dtype=bool)
     for box in boxes:
-        free &= np.hypot(*nearest_point_on_rectangle((x, y), np.array(box))) >= radius
+        free &= (
+            np.hypot(*nearest_point_on_rectangle((x, y), np.array([*box, 0.0])))
+            >= radius
+        )
     parts, _ = ndimage.label(free)
     begin = parts[round(1.0 / CELL), round(2.0 / CELL)]
     goal = np.hypot(x - 6.0, y) <= REACH + CELL

@@ -53,6 +53,8 @@ def test_rates_over_a_drawn_number_have_four_bins_and_wilson_intervals():
         cells = [PLAN.cells()[cell]["law"] == law for cell in table["cell"]]
         own = table[cells].sort_values(SPEED)
         assert len(x) == 4
+        left, right = axes.get_xlim()
+        assert left < x.min() < x.max() < right < left + 0.5
         for k, part in enumerate(np.array_split(np.arange(len(own)), 4)):
             group = own.iloc[part]
             hits = int((group["cause"] == "collision").sum())
@@ -104,6 +106,7 @@ def test_a_wrong_name_is_refused(quantity, over, by, message):
         ("laws.active.reach_m", "reach of law active (m)"),
         ("attraction.damping_n_s_m", "damping of attraction (N s/m)"),
         ("robots.second.robot.mass_kg", "mass of robot of second (kg)"),
+        ("own_gains.reach_m", "gain reach_m"),
         ("law", "law"),
         ("no.such.field", "no.such.field"),
     ],

@@ -14,16 +14,16 @@ from diagrams import load_scenario, simulate
 KINDS = [
     ("reached", math.nan, math.nan, None),
     ("completed", math.nan, math.nan, None),
-    ("collision", math.nan, math.nan, "never heard"),
+    ("collision", math.nan, math.nan, "no echo"),
     ("collision", 5.0, 0.4, "out of sight"),
     ("collision", 0.5, 0.3, "out of sight"),
-    ("collision", 0.5, 0.0, "heard late"),
-    ("collision", 5.0, 0.02, "pushed too little"),
+    ("collision", 0.5, 0.0, "late echo"),
+    ("collision", 5.0, 0.02, "echo in time"),
     # a tick without an echo is none at the tick before the last
-    ("collision", 5.0, 0.025, "pushed too little"),
+    ("collision", 5.0, 0.025, "echo in time"),
     ("collision", 5.0, 0.05, "out of sight"),
-    ("collision", 1.0, 0.0, "pushed too little"),
-    ("collision", 0.975, 0.0, "heard late"),
+    ("collision", 1.0, 0.0, "echo in time"),
+    ("collision", 0.975, 0.0, "late echo"),
     ("stuck", math.nan, math.nan, "jam"),
     ("timeout", math.nan, math.nan, "jam"),
     ("unsettled", math.nan, math.nan, "swings"),
@@ -69,7 +69,7 @@ def test_a_body_is_out_of_sight_when_it_had_no_echo_at_the_last_tick(tick_s):
         }
     )
     assert failure_mechanisms(rows).tolist() == [
-        *["pushed too little"] * 2,
+        *["echo in time"] * 2,
         *["out of sight"] * 2,
     ]
 
@@ -78,13 +78,13 @@ def test_a_body_is_out_of_sight_when_it_had_no_echo_at_the_last_tick(tick_s):
     ("obstacle", "mechanism"),
     [
         # straight ahead, and no law that pushes
-        ("waypoints_m: [[1.6, 0.0]]", "pushed too little"),
+        ("waypoints_m: [[1.6, 0.0]]", "echo in time"),
         # before the left end of the bar: outside of 45 deg from 0.35 m on
         ("waypoints_m: [[1.6, 0.36]]", "out of sight"),
         # from the side, against the bar's end
-        ("waypoints_m: [[0.0, 2.0], [0.0, -2.0]], speed_m_s: 3.0", "never heard"),
+        ("waypoints_m: [[0.0, 2.0], [0.0, -2.0]], speed_m_s: 3.0", "no echo"),
         # head-on: from the end of the cones, 3 m, in less than a second
-        ("waypoints_m: [[6.0, 0.0], [-9.0, 0.0]], speed_m_s: 3.0", "heard late"),
+        ("waypoints_m: [[6.0, 0.0], [-9.0, 0.0]], speed_m_s: 3.0", "late echo"),
     ],
 )
 def test_runs_that_fail_so(obstacle, mechanism):

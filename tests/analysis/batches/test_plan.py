@@ -175,9 +175,14 @@ def test_plan_survives_its_file(tmp_path):
     assert sweep.base["duration_s"] == 5.0
     other = tmp_path / "other"
     other.mkdir()
+    (other / "scenario.yaml").write_text(
+        dump_scenario(scenario_from_mapping(sweep.base)), "utf-8"
+    )
     copy = load_sweep(written(other / "copy.yaml", dump_plan(sweep)))
-    assert copy.points() == sweep.points()
-    assert copy.base == sweep.base
+    assert str(tmp_path) not in dump_plan(sweep)
+    assert [x.fields for x in copy.points()] == [x.fields for x in sweep.points()]
+    assert scenario_from_mapping(copy.base) == scenario_from_mapping(sweep.base)
+    assert copy.model_copy(update={"name": "gains"}).digest == sweep.digest
     assert (
         plan().digest
         == load_sweep(written(other / "plan.yaml", dump_plan(plan()))).digest
@@ -228,6 +233,19 @@ def test_bad_plan_is_refused(tmp_path, changes, field, hint):
         load_sweep(file).points()
     assert caught.value.field.startswith(field)
     assert hint in caught.value.message
+
+
+def test_a_scenario_is_no_sweep(tmp_path):
+    """One line names what to write; so does a field of the scenario in a sweep."""
+    file = written(tmp_path / "mine.yaml", "duration_s: 5\nlaw: active\n")
+    with pytest.raises(
+        InputError, match=r"is a scenario; .*'scenario: mine.yaml'"
+    ) as e:
+        load_sweep(file)
+    assert len(e.value.all) == 1
+    file = written(tmp_path / "mine.yaml", "runs: 5\nlaw: active\n")
+    with pytest.raises(InputError, match=r"law: .*write 'set: \{law: \.\.\.\}'"):
+        load_sweep(file)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from scipy.optimize import fsolve, minimize
 from analysis.loops.equilibria import find_equilibria
 from analysis.loops.force_field import ForceField
 from analysis.loops.ideal_loop import ideal_loop
+from analysis.loops.ideal_scenarios import ideal_scenario
 from analysis.loops.point_mass import point_mass
 from diagrams import load_scenario
 from diagrams.scenario.scenario import Scenario
@@ -321,3 +322,39 @@ def test_what_stays_open_is_said_first():
     assert not search.complete
     with pytest.raises(ValueError, match="no stable equilibrium"):
         search.follow_point()
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"polygon_m": [[0.2, 0.5], [-0.2, 0.5], [-0.2, -0.5], [0.2, -0.5]]},
+        {"radius_m": 0.3},
+    ],
+    ids=["polygon", "disc"],
+)
+def test_places_of_rest_before_other_shapes(shape):
+    """A box by its corners has those of a box; before a disc, push and pull balance."""
+    fields = {"hearing": "ideal_always", "law": "conventional"}
+    place = {"name": "it", "waypoints_m": [[2.0, 0.0]]}
+
+    def search(body):
+        obstacles = {"obstacles": [place | body]}
+        return find_equilibria(
+            ideal_scenario(load_scenario("wall", fields | obstacles))
+        )
+
+    found = search(shape)
+    assert found.complete
+    if "radius_m" not in shape:
+        expected = search({"size_m": [0.4, 1.0]})
+        assert [p.kind for p in found.points] == [p.kind for p in expected.points]
+        for one, other in zip(found.points, expected.points, strict=True):
+            np.testing.assert_allclose(one.p_WP, other.p_WP, atol=1e-6)
+        return
+    model = point_mass(found.scenario)
+    before = min(found.points, key=lambda point: float(point.p_WP[0]))
+    assert before.nearest_body == "it"
+    gap = 2.0 - 0.3 - before.p_WP[0]
+    pull = model.stiffness_n_m * (4.0 - before.p_WP[0] - model.follow_distance_m)
+    assert before.p_WP[1] == pytest.approx(0.0, abs=1e-9)
+    assert model.law.at_rest(np.array([gap]))[0] == pytest.approx(pull, rel=1e-3)

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from analysis.loops.point_mass import STEP_S, point_mass
 from diagrams.building.laws import make_controller
+from systems.framework.input_error import InputError
 from systems.laws.impedance_controller import (
     attraction_force,
     obstacle_speed,
@@ -17,16 +18,23 @@ from systems.laws.impedance_controller import (
 )
 from systems.ranging.ideal_obstacle_sensor import nearest_vectors
 
+#: A disc, and a wall with round ends.
+ROUND = (
+    "obstacles=[{name: disc, radius_m: 0.3, waypoints_m: [[2.0, 0.4]]}, "
+    "{name: wall, wall_m: [[3.0, -1.0], [3.5, -1.6]], thickness_m: 0.4}]"
+)
 LAWS = ("conventional", "active", "conventional2017", "active2017")
 
 
 def block_force(scenario, law, state, *, before=None):
     """Sum of forces by the blocks' functions; C a tick ago is that of ``before``."""
-    bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
+    bodies = [body.rectangles(0.0)[0] for body in scenario.bodies().values()]
 
     def vectors(p):
         slots = 3 if scenario.follower.collision_vector.aggregation == "sum" else 1
-        return nearest_vectors((p[0], p[1], 0.0), bodies, 0.0, 3.0, slots)
+        return nearest_vectors(
+            (p[0], p[1], 0.0), bodies, range(len(bodies)), 0.0, 3.0, slots
+        )
 
     C = {} if before is None else {round(v[0]): v[1:] for v in vectors(before)}
     closing = scenario.follower.collision_vector.velocity_term == "closing"
@@ -66,11 +74,13 @@ def test_force_at_rest_is_that_of_the_blocks(two_boxes, law, aggregation):
     np.testing.assert_allclose(model.force(free, "none"), expected, atol=2e-4)
 
 
+@pytest.mark.parametrize("round_", [False, True])
 @pytest.mark.parametrize("term", ["printed", "closing"])
 @pytest.mark.parametrize("law", LAWS)
-def test_force_in_motion_is_that_of_the_blocks(two_boxes, law, term):
+def test_force_in_motion_is_that_of_the_blocks(two_boxes, law, term, round_):
     """The blocks' difference over a very short tick is the derivative here."""
-    scenario = two_boxes(law, f"collision_vector.velocity_term={term}")
+    obstacles = (ROUND,) if round_ else ()
+    scenario = two_boxes(law, f"collision_vector.velocity_term={term}", *obstacles)
     model = point_mass(scenario)
     function = make_controller(scenario).radial_force
     free = states(200)
@@ -86,6 +96,13 @@ def test_force_in_motion_is_that_of_the_blocks(two_boxes, law, term):
     np.testing.assert_allclose(found, np.array(expected)[~near_reach], atol=1e-3)
 
 
+def test_pushes_of_walls_with_corners_are_not_added(two_boxes):
+    corner = "obstacles=[{name: L, wall_m: [[2, -1], [2, 1], [3, 1]]}]"
+    with pytest.raises(InputError, match="'sum' has no model with 'L'"):
+        point_mass(two_boxes("active", corner, "collision_vector.aggregation=sum"))
+    assert len(point_mass(two_boxes("active", corner)).rectangles) == 3
+
+
 def test_distances_are_those_of_the_sensor(two_boxes):
     model = point_mass(two_boxes("conventional"))
     points = states(100)[:, :2]
@@ -93,7 +110,7 @@ def test_distances_are_those_of_the_sensor(two_boxes):
         expected = [
             math.hypot(*v[0][1:])
             for p in points
-            if (v := nearest_vectors((*p, 0.0), [rectangle], 0.0, 99.0, 1))
+            if (v := nearest_vectors((*p, 0.0), [rectangle], [0], 0.0, 99.0, 1))
         ]
         np.testing.assert_allclose(model.distances(points)[:, k], expected, atol=1e-12)
 

@@ -59,7 +59,7 @@ def crowd(*bodies: tuple[float, float, float, float, float]) -> Figure:
     axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
     axes.set(xlim=(-2.0, 2.0), ylim=(-2.0, 2.0), aspect="equal")
     for number, body in enumerate(bodies):
-        axes.add_patch(Polygon(rectangle_corners(np.array(body)), fill=False))
+        axes.add_patch(Polygon(rectangle_corners([*body, 0.0]), fill=False))
         axes.add_artist(BodyLabel(f"{10 * number} s", body, "#0072B2"))
     return figure
 

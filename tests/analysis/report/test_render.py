@@ -137,7 +137,15 @@ def test_sections_have_anchors_and_headings_of_their_level():
 def test_pictures_are_links_to_their_files():
     shown = html(Picture("run.png", "The `run`"))
     assert '<a href="run.png"><img src="run.png" alt="The run"></a>' in shown
-    assert "<figcaption>The <code>run</code></figcaption>" in shown
+    assert "<figcaption>The <code>run</code> Full size: " in shown
+    assert '<a href="run.png">run.png</a></figcaption>' in shown
+    assert '<img class="tall" src' in html(Picture("run.png", "Run", tall=True))
+
+
+def test_tables_without_headings_are_pairs():
+    """On paper, these tables are in two columns."""
+    assert '<table class="pairs"><tbody>' in html(Table(["", ""], [["mass", 2.0]]))
+    assert "<table><thead>" in html(Table(["part", ""], [["mass", 2.0]]))
 
 
 def test_figures_are_well_formed_and_the_same_each_time() -> None:

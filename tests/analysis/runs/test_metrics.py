@@ -22,7 +22,8 @@ from diagrams.running.stop_rules import Collision
 from diagrams.scenario.scenario import Scenario
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.ultrasonic_array import cone_ranges
-from systems.world.geometry import contact_time, rectangle_clearance
+from systems.world.contacts import contact_time
+from systems.world.geometry import rectangle_clearance
 
 TICK = 0.025
 #: Half the robot's length: P and its front face.
@@ -536,7 +537,7 @@ def collision(x: float, y: float, theta: float, *, ticks: int = 81) -> RunResult
         source={"waypoints_m": [[0.0, 5.0]]},
     )
     array = UltrasonicParameters()
-    body = np.array([[2.0, 0.0, 0.0, 0.1, 0.1]])
+    body = np.array([[2.0, 0.0, 0.0, 0.1, 0.1, 0.0]])
     for tick, pose in enumerate(result.poses("WB")):
         ranges = cone_ranges(pose, body, array, FRONT)
         echo = ranges <= array.maximum_range_m

@@ -14,7 +14,7 @@ from analysis.runs.shortest_path import shortest_path_length
 from systems.world.geometry import nearest_point_on_rectangle
 
 RADIUS = 0.41
-SPECK = (0.0, 0.0, 0.3, 1e-9, 1e-9)
+SPECK = (0.0, 0.0, 0.3, 1e-9, 1e-9, 0.0)
 
 
 def test_straight_to_the_circle_round_the_goal():
@@ -34,7 +34,7 @@ def test_round_a_point_are_two_tangents_and_an_arc():
 def test_round_a_wall():
     """Tangent, quarter arc, along the wall's end, and the same again."""
     r, half, thick = 0.2, 1.0, 0.2
-    wall = (0.0, 0.0, math.pi / 2, 2 * half, thick)
+    wall = (0.0, 0.0, math.pi / 2, 2 * half, thick, 0.0)
     x = 2.0 - thick / 2
     leg = math.sqrt(x * x + half * half - r * r)
     turn = math.atan2(half, x) + math.asin(r / math.hypot(x, half))
@@ -45,10 +45,10 @@ def test_round_a_wall():
 
 def test_a_closed_ring_has_no_way():
     ring = [
-        (1.5, 0, 0, 0.1, 3),
-        (-1.5, 0, 0, 0.1, 3),
-        (0, 1.5, 0, 3, 0.1),
-        (0, -1.5, 0, 3, 0.1),
+        (1.5, 0, 0, 0.1, 3, 0),
+        (-1.5, 0, 0, 0.1, 3, 0),
+        (0, 1.5, 0, 3, 0.1, 0),
+        (0, -1.5, 0, 3, 0.1, 0),
     ]
     assert shortest_path_length((0, 0), (4, 0), 0.5, ring, RADIUS) == math.inf
 
@@ -56,7 +56,7 @@ def test_a_closed_ring_has_no_way():
 def test_a_gap_narrower_than_the_disc_is_closed():
     def through(gap: float) -> float:
         half = 0.05 + gap / 2
-        posts = [(0, half, 0, 0.1, 0.1), (0, -half, 0, 0.1, 0.1)]
+        posts = [(0, half, 0, 0.1, 0.1, 0), (0, -half, 0, 0.1, 0.1, 0)]
         return shortest_path_length((-2, 0), (2, 0), 0.0, posts, RADIUS)
 
     assert through(2 * RADIUS + 0.01) == pytest.approx(4.0)
@@ -70,7 +70,7 @@ def test_a_start_beside_a_box_is_no_dead_end():
     down = math.asin(r / distance) + math.atan2(half, ahead)
     leg = math.sqrt(distance**2 - r * r) - 0.5
     exact = half + r * (math.pi / 2 + down) + 0.1 + leg
-    box = (0.3, 0.0, 0.0, 0.1, 2 * half)
+    box = (0.3, 0.0, 0.0, 0.1, 2 * half, 0.0)
     length = shortest_path_length((0, 0), (3, 0), 0.5, [box], RADIUS)
     assert exact <= length <= 1.002 * exact
 
@@ -119,6 +119,7 @@ def test_among_boxes_it_is_what_a_grid_finds(seed):
             generator.uniform(-1.2, 1.2, (4, 2)),
             generator.uniform(-3, 3, 4),
             generator.uniform(0.1, 0.8, (4, 2)),
+            [0.0, 0.0, 0.05, 0.15],
         ]
     )
     task = ((-2.5, 0.0), (2.5, 0.0), 0.5, boxes, 0.3)
@@ -137,6 +138,7 @@ def test_among_boxes_it_is_what_a_grid_finds(seed):
             st.floats(-3.0, 3.0),
             st.floats(0.05, 1.0),
             st.floats(0.05, 1.0),
+            st.just(0.0),
         ),
         max_size=3,
     )

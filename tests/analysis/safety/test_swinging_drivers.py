@@ -67,11 +67,11 @@ def test_a_swinging_driver_visits_a_box_and_comes_back_to_it():
     names = "box", "swing", "plain"
     result = run_result(swing_at_boxes(names, [box], BY_HAND, 60.0, swings=1))
     robot, near, aimed = result.scenario.only.robot, [], []
-    body = np.array([0.0, 0.0, 0.0, robot.length_m, robot.width_m])
+    body = np.array([0.0, 0.0, 0.0, robot.length_m, robot.width_m, 0.0])
     corner = math.atan2(robot.width_m, robot.length_m)
     for x, y, theta in result.poses("WB"):
         body[:3] = x, y, theta
-        near.append(rectangle_clearance(body, np.array(box)) < 0.15)
+        near.append(rectangle_clearance(body, np.array([*box, 0.0])) < 0.15)
         off = math.atan2(-1.48 - y, -x) - theta
         off = (off + math.pi) % math.tau - math.pi
         aimed.append(near[-1] and abs(abs(off) - corner) < 0.05)

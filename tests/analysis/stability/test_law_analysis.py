@@ -138,3 +138,11 @@ def test_a_section_is_added_as_docs_extending_says():
     shown = shown[: shown.index("</section>")]
     assert shown.count("<figure>") == shown.count("<table>") == 1
     assert "crossover (rad/s)" in shown
+
+
+def test_a_body_that_moves_is_named_before_the_numbers() -> None:
+    """Everything in the report is about bodies at rest; a run is not."""
+    (note,) = analyze_law(load_scenario("one_moving_obstacle"), []).notes
+    assert note.startswith("obstacle 1 can move; this whole report is about bodies at")
+    assert "obstacle 1 at (2.6, 2.4) m" in note
+    assert analyze_law(load_scenario("default"), []).notes == []

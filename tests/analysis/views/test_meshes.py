@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.views.meshes import arrow, circle, rectangles, ribbon, star
+from analysis.views.meshes import arrow, circle, prism, rectangles, ribbon, star
 
 
 def area(mesh):
@@ -39,3 +39,21 @@ def test_an_arrow_ends_one_metre_ahead_and_a_star_has_five_tips():
     assert tip == pytest.approx([1.0, 0.0, 0.0])
     middle = star(0.2, 0.0, 1e-6).vertices[:2, :10]
     assert (np.hypot(*middle) > 0.19).sum() == 5
+
+
+def test_a_prism_has_the_area_of_its_outline_on_top():
+    """Stars with dents, in both orders: the top by the shoelace formula."""
+    rng = np.random.default_rng(4)
+    for turn in (1, -1):
+        angle = np.linspace(0.0, 2.0 * math.pi, 17)[:-1]
+        far = rng.uniform(0.3, 2.0, 16)
+        outline = np.column_stack([far * np.cos(angle), far * np.sin(angle)])[::turn]
+        x, y = outline.T
+        top = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        around = np.hypot(*(np.roll(outline, -1, axis=0) - outline).T).sum()
+        mesh = prism(outline, 0.35)
+        assert area(mesh) == pytest.approx(top + 0.35 * around)
+        # All triangles of the top face up.
+        a, b, c = (mesh.vertices.T[corner] for corner in mesh.faces)
+        up = np.cross(b - a, c - a)[:, 2]
+        assert up.sum() / 2.0 == pytest.approx(top)

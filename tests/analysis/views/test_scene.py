@@ -59,7 +59,7 @@ def test_what_was_hit_is_seen_from_the_collision_on(collision_run):
     (hit,) = of_kind(collision_run, Touched)
     assert hit.path == "obstacles/box/hit"
     assert hit.pose(0)[:2] == pytest.approx([1.0, 0.1])
-    assert (hit.shape.length, hit.shape.width) == pytest.approx((0.3, 0.3))
+    assert hit.shape.shape.rectangles[0, 3:] == pytest.approx([0.3, 0.3, 0.0])
     assert not hit.visible(0)
     assert hit.visible(len(collision_run.time) - 1)
 

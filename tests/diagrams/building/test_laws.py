@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from diagrams import build_sound_follower, load_scenario
 from diagrams.building.laws import make_controller
 from diagrams.scenario.scenario import Scenario
+from phonotaxis.testing import evaluate
 from systems.framework.input_error import InputError
 from systems.laws.catalog import FORCE_LAWS, LAWS
 
@@ -42,18 +42,16 @@ def own_laws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 def repulsion_of(controller) -> float:
     """Force along x by a new obstacle 0.4 m ahead, N."""
-    context = controller.CreateDefaultContext()
-    inputs = {
-        "p_WS_estimated": [5.0, 0.0],
-        "target_valid": [1.0],
-        "collision_vectors_B": [0.4, 0, 0, 0, 0, 0],
-        "features": [2, 0, 0],
-        "pose_WB_estimated": [0, 0, 0],
-        "v_WP": [0, 0],
-    }
-    for name, value in inputs.items():
-        controller.GetInputPort(name).FixValue(context, np.array(value, float))
-    return float(controller.GetOutputPort("forces_W").Eval(context)[2])
+    outputs = evaluate(
+        controller,
+        p_WS_estimated=[5.0, 0.0],
+        target_valid=[1.0],
+        collision_vectors_B=[0.4, 0, 0, 0, 0, 0],
+        features=[2, 0, 0],
+        pose_WB_estimated=[0, 0, 0],
+        v_WP=[0, 0],
+    )
+    return float(outputs["forces_W"][2])
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ def test_four_robots_are_four_diagrams_that_see_one_another():
         assert ("safety_filter" in blocks) == (name != "third")
         sensor = blocks["ideal_object_sensor"]
         assert sensor.GetInputPort("poses_WO").size() == 3 * 3
-        assert sensor.GetInputPort("sizes").size() == 2 * 3
+        assert sensor.GetInputPort("sizes").size() == 3 * 3
 
 
 def test_the_same_seed_gives_the_same_bytes():

@@ -61,7 +61,7 @@ OBJECTS = {
     "objects.latency_s": 0.05,
 }
 #: Two robots that drive towards each other and past, 0.9 m wide each.
-MEETING = {
+MEETING: dict[str, Any] = {
     "robots": {
         "near": {"start": {"position_m": [0.0, 0.0]}},
         "far": {
@@ -72,6 +72,27 @@ MEETING = {
     "source.waypoints_m": [[2.2, 0.5], [4.0, 0.5]],
     "obstacles": [{"name": "box", "size_m": [0.2, 0.2], "waypoints_m": [[1.2, -0.6]]}],
 }
+#: Bodies near them that repeat a lap, stop and turn, and keep to times.
+SCHEDULES = [
+    *MEETING["obstacles"],
+    {
+        "name": "lap",
+        "waypoints_m": [[1.4, -1.4], [2.0, -1.4], [2.0, -1.1]],
+        "speed_m_s": 0.8,
+        "at_end": "loop",
+    },
+    {
+        "name": "stop",
+        "waypoints_m": [[2.9, 1.5], [2.6, 1.5], [2.6, 1.9]],
+        "pauses_s": [0.2, 0.5, 0.0],
+    },
+    {
+        "name": "times",
+        "waypoints_m": [[1.0, 2.6], [1.6, 2.6]],
+        "waypoint_times_s": [0.2, 1.9],
+        "at_end": "shuttle",
+    },
+]
 RUNS: dict[str, tuple[str, dict[str, Any]]] = {
     "by ear": (
         "default",
@@ -143,6 +164,8 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
         "default",
         {
             **MEETING,
+            "obstacles": SCHEDULES,
+            "source.waypoint_times_s": [0.5, 7.0],
             "duration_s": 4.0,
             "hearing": "ideal",
             "law": "dwa",

@@ -230,7 +230,7 @@ def test_both_followers_of_one_source_complete():
 
 def test_a_robot_alone_has_ports_to_be_wired_by_hand():
     scenario = Scenario.model_validate({"loudspeaker": {}})
-    robot = make_robot(scenario, "mine", bodies=2, others=["radio"])
+    robot = make_robot(scenario, "mine", owners=(0, 1), others=["radio"])
     inputs = {
         robot.get_input_port(k).get_name(): robot.get_input_port(k)
         for k in range(robot.num_input_ports())
@@ -245,7 +245,8 @@ def test_a_robot_alone_has_ports_to_be_wired_by_hand():
     assert inputs["poses_WO"].size() == 6
     outputs = [robot.get_output_port(k) for k in range(robot.num_output_ports())]
     names = [port.get_name() for port in outputs]
-    assert names == ["pose_WB", "velocity_WB", "own_emission"]
+    shown = ["echo", "p_WS_estimated", "target_valid"]
+    assert names == ["pose_WB", "velocity_WB", *shown, "own_emission"]
     assert robot.get_name() == "mine"
 
 
@@ -299,7 +300,10 @@ PAIR = "robots={a: {}, b: {start: {position_m: [-2, 0]}}}"
         (["robots={A b: {}}"], r"robots\.A b: is 'A b'; string should match"),
         # Files of the run are named after it.
         ([f"robots={{{'x' * 65}: {{}}}}"], r"robots\.x+: .*at most 64 characters"),
-        ([PAIR, "robots.b.lawn=none"], r"robots\.b\.lawn: is not a field .*'law'"),
+        (
+            [PAIR, "robots.b.lawn=none"],
+            r"robots\.b\.lawn: did you mean 'robots\.b\.law'",
+        ),
         ([PAIR, "robots.b.law=3"], r"robots\.b\.law: is 3; input should be a valid"),
         (
             [PAIR, "robots.b.attraction.stiffness_n_m=-1"],

@@ -338,7 +338,7 @@ def test_contact_between_two_ticks_is_found():
     robot = robot_rectangle(result.scenario.only.start.pose, result.scenario.only.robot)
     path = result.scenario.obstacles[0].path()
     for tick in range(40):
-        body = np.array([*path.pose(tick * 0.025), 0.002, 0.002])
+        body = np.array([*path.pose(tick * 0.025), 0.002, 0.002, 0.0])
         assert rectangle_clearance(robot, body) > 0.0, "clear at every tick"
 
 
@@ -445,7 +445,7 @@ def test_corners_are_not_cut_however_fast():
             result.scenario.only.start.pose, result.scenario.only.robot
         )
         dense = [
-            rectangle_clearance(robot, np.array([*path.pose(t), 0.002, 0.002]))
+            rectangle_clearance(robot, np.array([*path.pose(t), 0.002, 0.002, 0.0]))
             for t in np.linspace(0.0, 0.2, 8001)
         ]
         assert (result.cause == "collision") == (min(dense) < 0.0) == (not outside)

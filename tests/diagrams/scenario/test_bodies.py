@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario.bodies import Body, RecordedPath, Surroundings
+from systems.world.shapes import box
 
 
 def test_a_recorded_path_is_straight_between_ticks():
@@ -20,7 +21,7 @@ def test_a_recorded_path_is_straight_between_ticks():
 
 def test_what_is_followed_is_no_obstacle():
     bodies = {
-        name: Body(RecordedPath(np.zeros(1), np.array([[k, 0, 0]])), (1.0, 1.0))
+        name: Body(RecordedPath(np.zeros(1), np.array([[k, 0, 0]])), box((1.0, 1.0)))
         for k, name in enumerate("abc")
     }
     around = Surroundings(bodies, "b")

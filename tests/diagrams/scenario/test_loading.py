@@ -108,7 +108,13 @@ def test_one_of_everything_runs(tmp_path):
     scenario = load_scenario(write(tmp_path, ONE_OF_EVERYTHING))
     run, robot = untouched(scenario), untouched(scenario.of_robot("robot").follower)
     assert run == {"engine", "odor", "radio", "wind"}
-    assert robot == {"blocks", "obstacle_sensing", "microphones", "tdoa"}
+    assert robot == {
+        "blocks",
+        "own_gains",
+        "obstacle_sensing",
+        "microphones",
+        "tdoa",
+    }
     assert simulate(scenario).simulated_s == pytest.approx(0.1)
 
 
@@ -211,8 +217,8 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
 @pytest.mark.parametrize(
     ("override", "field", "message"),
     [
-        ("sead=2", "sead", "not a field.*did you mean 'seed'"),
-        ("source.sped_m_s=2", "source.sped_m_s", "did you mean 'speed_m_s'"),
+        ("sead=2", "sead", "did you mean 'seed'"),
+        ("source.sped_m_s=2", "source.sped_m_s", "did you mean 'source.speed_m_s'"),
         ("obstacles.0.sise_m=[1, 1]", "obstacles.0.sise_m", "not a field"),
         ("source.sound.kind=tone", "source.sound", "use sound"),
         ("zzzzz=2", "zzzzz", "not a field of a scenario; remove it"),
@@ -368,3 +374,38 @@ def test_an_obstacle_is_set_by_its_name():
 def test_names_that_are_not_one_obstacle(settings, message):
     with pytest.raises(InputError, match=rf"^obstacles\.\w+: .*{message}"):
         load_scenario("default", settings)
+
+
+@pytest.mark.parametrize("letter", ["\x1b", "\n", "\x07", "\u202e", "\u2028", "\x9b"])
+def test_control_characters_in_names_are_refused(letter):
+    """They would change a terminal, end a line, or reverse a text."""
+    from analysis.batches.plan import SweepPlan
+
+    bad = f"a{letter}b"
+    for data in (
+        {"name": bad},
+        {"description": bad},
+        {"obstacles": [{"name": bad, "waypoints_m": [[3.0, 1.0]]}]},
+    ):
+        with pytest.raises(InputError) as error:
+            load_scenario(data)
+        assert f"has the control character U+{ord(letter):04X}" in error.value.message
+        assert field_of(error).endswith(("name", "description"))
+    with pytest.raises(ValueError, match="control character"):
+        SweepPlan(name=bad)
+    assert load_scenario({"name": "\u00e9t\u00e9 \u0645 1"}).name
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("sweep.yaml", r"runs of a sweep; .*scenario\.yaml is the scenario"),
+        ("recommended.yaml", r"simulate .*recommended\.yaml or .*scenario\.yaml"),
+    ],
+)
+def test_results_of_many_runs_are_no_scenario(tmp_path, file, message):
+    (tmp_path / "scenario.yaml").write_text("seed: 3\n")
+    assert load_scenario(tmp_path).seed == 3
+    (tmp_path / file).touch()
+    with pytest.raises(InputError, match=message):
+        load_scenario(tmp_path)

@@ -12,12 +12,8 @@ from analysis.loops.ideal_loop import ideal_loop
 from analysis.loops.radial_law import radial_law
 from diagrams import Scenario, load_scenario
 from diagrams.running.compiled.loop_blocks import shared_blocks
-from diagrams.scenario.own_code import (
-    code_of_sweep,
-    import_own,
-    loaded_digests,
-    own_files,
-)
+from diagrams.scenario.own_code import import_own, own_files
+from diagrams.scenario.own_versions import code_of_sweep, loaded_digests
 from systems.framework.input_error import InputError
 
 LAW = """

@@ -34,7 +34,7 @@ def test_plain_values(text, value):
         ("&a [*a]", r"\*a contains itself"),
         ("[" * (DEEPEST + 1) + "]" * (DEEPEST + 1), "more than 20 deep"),
         ("[" * 90_000, "more than 20 deep"),
-        ("x" * (LARGEST_BYTES + 1), "more than 100 kB"),
+        ("x" * (LARGEST_BYTES + 1), "more than 300 kB"),
         ("a: [1", "line 1, column 6"),
         ("a: 1\na: 2", "line 2, column 1: found duplicate key"),
         ("!!int x", "ValueError"),

@@ -14,6 +14,7 @@ from pydrake.systems.analysis import (
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
 from diagrams.scenario.run_parameters import RunParameters
+from phonotaxis.testing import Bench, assert_linearization
 from systems.base.diff_drive_plant import DiffDrivePlant
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
@@ -120,27 +121,20 @@ def test_own_dimensions():
 
 
 @pytest.mark.parametrize("command", [[math.nan, 0.0], [0.0, math.inf]])
-def test_a_command_that_is_not_finite_is_an_error(bench, command):
-    at = bench(DiffDrivePlant(), wheel_speeds=command)
+def test_a_command_that_is_not_finite_is_an_error(command):
+    at = Bench(DiffDrivePlant(), wheel_speeds=command)
     with pytest.raises(ValueError, match=r"DiffDrivePlant: .* block upstream"):
-        at.block.EvalTimeDerivatives(at.context)
+        at.rates()
 
 
 @pytest.mark.parametrize("wheel_speeds", [[4.0, -3.0], [20.0, -15.0]])
-def test_gradient(bench, check_gradient, wheel_speeds):
+def test_gradient(wheel_speeds):
     """Derivatives and outputs, free and saturated."""
-
-    def respond(block, x):
-        at = bench(block, state=x[:7], wheel_speeds=x[7:])
-        rates = block.EvalTimeDerivatives(at.context).CopyToVector()
-        names = ("pose_WB", "velocity_WB", "wheel_angles")
-        return [*rates, *(value for name in names for value in at.output(name))]
-
     robot = RobotParameters(wheel_radius_m=0.1, wheel_separation_m=0.5)
     plant = PlantParameters(motor_lag_s=0.1, slip=(0.1, 0.3))
     block = DiffDrivePlant(robot=robot, plant=plant)
-    point = [0.5, -0.2, 0.7, 3.0, 2.0, 1.5, -0.8, *wheel_speeds]
-    check_gradient(block, respond, point)
+    state = [0.5, -0.2, 0.7, 3.0, 2.0, 1.5, -0.8]
+    assert_linearization(block, state=state, wheel_speeds=wheel_speeds)
 
 
 def test_initial_pose_survives_conversion():

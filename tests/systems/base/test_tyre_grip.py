@@ -19,6 +19,7 @@ from pydrake.systems.analysis import (
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize
 
+from phonotaxis.testing import Bench, assert_linearization, evaluate
 from systems.base.diff_drive_plant import DiffDrivePlant
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
@@ -241,39 +242,32 @@ def test_spinning_wheels_have_no_hold_to_the_side():
     np.testing.assert_allclose([forward, leftward, yaw], [*along, 0.0], atol=1e-5)
 
 
-def test_slip_velocities_are_rims_less_ground(bench):
+def test_slip_velocities_are_rims_less_ground():
     state = [0, 0, 0.3, 0, 0, 5.0, 7.0, 0.2, -0.05, 0.4]
-    at = bench(
+    outputs = evaluate(
         DiffDrivePlant(plant=PlantParameters(friction=0.2)),
         state=state,
         wheel_speeds=[0, 0],
     )
     expected = [0.3 - (0.2 - 0.4 * HALF), 0.42 - (0.2 + 0.4 * HALF), -0.05]
-    np.testing.assert_allclose(at.output("slip_velocities"), expected)
+    np.testing.assert_allclose(outputs["slip_velocities"], expected)
     c, s = math.cos(0.3), math.sin(0.3)
     velocity = [0.2 * c + 0.05 * s, 0.2 * s - 0.05 * c, 0.4]
-    np.testing.assert_allclose(at.output("velocity_WB"), velocity)
+    np.testing.assert_allclose(outputs["velocity_WB"], velocity)
 
 
-def test_a_rolling_robot_slips_by_its_constant_share(bench):
+def test_a_rolling_robot_slips_by_its_constant_share():
     plant = DiffDrivePlant(plant=PlantParameters(slip=(0.2, 0.0)))
-    at = bench(plant, state=[0, 0, 0, 0, 0, 5.0, 5.0], wheel_speeds=[5, 5])
-    np.testing.assert_allclose(at.output("slip_velocities"), [0.06, 0, 0], atol=1e-12)
+    outputs = evaluate(plant, state=[0, 0, 0, 0, 0, 5.0, 5.0], wheel_speeds=[5, 5])
+    np.testing.assert_allclose(outputs["slip_velocities"], [0.06, 0, 0], atol=1e-12)
 
 
 @pytest.mark.parametrize("wheel_speeds", [[5.1, 4.9], [11.0, -11.0]])
-def test_gradient_with_friction(bench, check_gradient, wheel_speeds):
+def test_gradient_with_friction(wheel_speeds):
     """Where both wheels hold, and where both slide."""
-
-    def respond(block, x):
-        at = bench(block, state=x[:10], wheel_speeds=x[10:])
-        rates = block.EvalTimeDerivatives(at.context).CopyToVector()
-        names = ("pose_WB", "velocity_WB", "wheel_angles", "slip_velocities")
-        return [*rates, *(value for name in names for value in at.output(name))]
-
     block = DiffDrivePlant(plant=PlantParameters(friction=0.4))
-    point = [0.5, -0.2, 0.7, 3.0, 2.0, 5.0, 5.0, 0.3, 0.001, 0.01, *wheel_speeds]
-    check_gradient(block, respond, point)
+    state = [0.5, -0.2, 0.7, 3.0, 2.0, 5.0, 5.0, 0.3, 0.001, 0.01]
+    assert_linearization(block, state=state, wheel_speeds=wheel_speeds)
 
 
 @pytest.mark.parametrize("friction", [0.0, -0.3, 101.0, math.nan, "ice"])
@@ -282,8 +276,8 @@ def test_friction_has_a_range(friction):
         PlantParameters(friction=friction)
 
 
-def test_a_command_that_is_not_finite_is_an_error_with_friction_too(bench):
+def test_a_command_that_is_not_finite_is_an_error_with_friction_too():
     block = DiffDrivePlant(plant=PlantParameters(friction=0.4))
-    at = bench(block, wheel_speeds=[math.nan, 0.0])
+    at = Bench(block, wheel_speeds=[math.nan, 0.0])
     with pytest.raises(ValueError, match=r"DiffDrivePlant: .* block upstream"):
-        block.EvalTimeDerivatives(at.context)
+        at.rates()

@@ -14,6 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from scipy.integrate import quad
 
+from phonotaxis.testing import Bench, assert_linearization, evaluate
 from systems.base.diff_drive_plant import DiffDrivePlant
 from systems.base.lagged_motion import advance_pose, lagged_motion
 from systems.base.parameters import PlantParameters
@@ -203,22 +204,22 @@ def test_quadrature_follows_any_lag_and_any_tick(tick_s, lag):
     assert x == pytest.approx(expected, abs=2e-9)
 
 
-def test_pose_follows_the_angles_without_a_tick_of_delay(bench):
+def test_pose_follows_the_angles_without_a_tick_of_delay():
     block = WheelOdometry(plant=EXACT, initial_pose=(1.0, 2.0, 0.0))
-    at = bench(block, wheel_angles=[0.0, 0.0], wheel_speeds=[10.0, 10.0])
-    at.block.GetInputPort("wheel_angles").FixValue(at.context, [0.25, 0.25])
+    at = Bench(block, wheel_angles=[0.0, 0.0], wheel_speeds=[10.0, 10.0])
+    at.set(wheel_angles=[0.25, 0.25])
     np.testing.assert_allclose(at.output("pose_WB_estimated"), [1.015, 2.0, 0.0])
     np.testing.assert_allclose(
         at.output("velocity_WB_estimated"), [0.6, 0.0, 0.0], atol=1e-12
     )
 
 
-def test_pose_adds_up_over_ticks(bench):
-    at = bench(
+def test_pose_adds_up_over_ticks():
+    at = Bench(
         WheelOdometry(plant=EXACT), wheel_angles=[0.0, 0.0], wheel_speeds=[8.0, 12.0]
     )
     for k in range(1, 30):
-        at.block.GetInputPort("wheel_angles").FixValue(at.context, [0.2 * k, 0.3 * k])
+        at.set(wheel_angles=[0.2 * k, 0.3 * k])
         way, turn = 0.06 * 0.25 * k, 0.06 * 0.1 * k / 0.41
         radius = way / turn
         expected = radius * math.sin(turn), radius * (1.0 - math.cos(turn)), turn
@@ -227,23 +228,23 @@ def test_pose_adds_up_over_ticks(bench):
 
 
 @pytest.mark.parametrize(("angle", "pulses"), [(0.9, 0), (1.1, 1), (-0.1, -1)])
-def test_encoders_count_whole_pulses(bench, angle, pulses):
-    at = bench(
+def test_encoders_count_whole_pulses(angle, pulses):
+    outputs = evaluate(
         WheelOdometry(),
         wheel_angles=[angle * PULSE, angle * PULSE],
         wheel_speeds=[0.0, 0.0],
     )
     expected = 0.06 * pulses * PULSE
-    np.testing.assert_allclose(at.output("pose_WB_estimated"), [expected, 0, 0])
+    np.testing.assert_allclose(outputs["pose_WB_estimated"], [expected, 0, 0])
 
 
-def test_rounding_does_not_accumulate(bench):
+def test_rounding_does_not_accumulate():
     """Angles are rounded, not steps: after 500 ticks still within a pulse."""
-    at = bench(WheelOdometry(), wheel_angles=[0.0, 0.0], wheel_speeds=[0.3, 0.3])
+    at = Bench(WheelOdometry(), wheel_angles=[0.0, 0.0], wheel_speeds=[0.3, 0.3])
     step = 3.3717 * PULSE
     for k in range(1, 501):
         angles = [k * step, k * step]
-        at.block.GetInputPort("wheel_angles").FixValue(at.context, angles)
+        at.set(wheel_angles=angles)
         at.tick()
     driven = at.output("pose_WB_estimated")[0]
     assert 0.0 <= 0.06 * 500 * step - driven < 0.06 * PULSE
@@ -279,12 +280,12 @@ def test_a_rounded_angle_has_no_derivative():
         WheelOdometry().ToAutoDiffXd()
 
 
-def test_gradient(bench, check_gradient):
-    def respond(block, x):
-        at = bench(block, state=x[:5], wheel_angles=x[5:7], wheel_speeds=x[7:])
-        pose = at.output("pose_WB_estimated")
-        return [*pose, *at.output("velocity_WB_estimated"), *at.updated()]
-
+def test_gradient():
     robot = RobotParameters(wheel_radius_m=0.1, wheel_separation_m=0.5)
     block = WheelOdometry(robot=robot, plant=EXACT)
-    check_gradient(block, respond, [0.3, -0.2, 0.9, 4.0, 5.0, 4.3, 5.6, 3.0, -2.0])
+    assert_linearization(
+        block,
+        state=[0.3, -0.2, 0.9, 4.0, 5.0],
+        wheel_angles=[4.3, 5.6],
+        wheel_speeds=[3.0, -2.0],
+    )

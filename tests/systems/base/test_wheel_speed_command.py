@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 from pydrake.autodiffutils import AutoDiffXd
 
+from phonotaxis.testing import Bench, assert_linearization
 from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
@@ -105,29 +106,29 @@ def test_a_full_turn_to_the_side_is_scaled():
     assert (left, right) == (pytest.approx(-12.0), pytest.approx(12.0))
 
 
-def test_acts_from_the_tick_on_and_not_before(bench):
-    at = bench(WheelCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0])
+def test_acts_from_the_tick_on_and_not_before():
+    at = Bench(WheelCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0])
     np.testing.assert_array_equal(at.output("wheel_speeds"), [0.0, 0.0])
     at.tick()
     np.testing.assert_allclose(at.output("v_WP"), [0.05, 0.0])
     np.testing.assert_allclose(at.output("wheel_speeds"), [0.05 / 0.06] * 2)
 
 
-def test_constant_push_does_not_wind_up(bench):
-    at = bench(WheelCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0])
+def test_constant_push_does_not_wind_up():
+    at = Bench(WheelCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0])
     for _ in range(100):
         at.tick()
     assert at.output("v_WP")[0] == pytest.approx(0.72)
-    at.block.GetInputPort("acceleration_W").FixValue(at.context, [-2.0, 0.0])
+    at.set(acceleration_W=[-2.0, 0.0])
     at.tick()
     assert at.output("v_WP")[0] == pytest.approx(0.67)
 
 
-def test_own_dimensions_are_used(bench):
+def test_own_dimensions_are_used():
     robot = RobotParameters(
         wheel_radius_m=0.1, wheel_separation_m=0.5, control_point_m=0.25
     )
-    at = bench(
+    at = Bench(
         WheelCommand(robot=robot),
         acceleration_W=[4.0, 2.0],
         pose_WB_estimated=[0, 0, 0],
@@ -144,54 +145,49 @@ def test_own_dimensions_are_used(bench):
         [0.1, 0.7, 0.5, 0.3, -0.4],
     ],
 )
-def test_gradient(bench, check_gradient, point):
+def test_gradient(point):
     """Free, clamped, and with the wheels scaled."""
-
-    def respond(block, x):
-        at = bench(
-            block,
-            state=[x[0], x[1], 0.0, 0.0],
-            acceleration_W=x[2:4],
-            pose_WB_estimated=[0.0, 0.0, x[4]],
-        )
-        return [*at.updated(), *at.output("v_WP")]
-
     robot = RobotParameters(control_point_m=0.2, top_speed_m_s=0.7)
-    check_gradient(WheelCommand(robot=robot), respond, point)
+    assert_linearization(
+        WheelCommand(robot=robot),
+        state=[*point[:2], 0.0, 0.0],
+        acceleration_W=point[2:4],
+        pose_WB_estimated=[0.0, 0.0, point[4]],
+    )
 
 
-def commanded(bench, port, command, theta=0.7):
+def commanded(port, command, theta=0.7):
     """Velocity of P and wheel speeds after a tick with a command."""
     block = WheelCommand(command=port)
-    at = bench(block, **{port: command}, pose_WB_estimated=[0.3, -0.1, theta])
+    at = Bench(block, **{port: command}, pose_WB_estimated=[0.3, -0.1, theta])
     np.testing.assert_array_equal(at.output("wheel_speeds"), [0.0, 0.0])
     at.tick()
     return at.output("v_WP"), at.output("wheel_speeds")
 
 
-def test_velocity_is_obeyed_at_once(bench):
-    v_WP, wheels = commanded(bench, "velocity_W", [0.1, -0.1])
+def test_velocity_is_obeyed_at_once():
+    v_WP, wheels = commanded("velocity_W", [0.1, -0.1])
     np.testing.assert_allclose(v_WP, [0.1, -0.1])
     np.testing.assert_allclose(wheels, wheels_for((0.1, -0.1), 0.7))
 
 
-def test_velocity_beyond_top_speed_keeps_its_direction(bench):
-    v_WP, wheels = commanded(bench, "velocity_W", [3.0, 4.0])
+def test_velocity_beyond_top_speed_keeps_its_direction():
+    v_WP, wheels = commanded("velocity_W", [3.0, 4.0])
     np.testing.assert_allclose(v_WP, [0.6 * 0.72, 0.8 * 0.72])
     assert max(abs(wheels)) <= 12.0 + 1e-12
 
 
-def test_twist_is_obeyed_at_once_whatever_the_heading(bench):
+def test_twist_is_obeyed_at_once_whatever_the_heading():
     for theta in (0.0, 0.7, -2.5):
-        v_WP, wheels = commanded(bench, "twist_B", [0.3, 0.5], theta)
+        v_WP, wheels = commanded("twist_B", [0.3, 0.5], theta)
         twist = body_twist(wheels, ROBOT)
         assert twist == pytest.approx((0.3, 0.5))
         assert np.linalg.norm(v_WP) == pytest.approx(math.hypot(0.3, 0.175 * 0.5))
 
 
 @pytest.mark.parametrize("twist", [[2.0, 1.0], [0.5, 6.0], [-1.0, 2.0], [0.0, 9.0]])
-def test_twist_beyond_the_limits_keeps_its_curvature(bench, twist):
-    v_WP, wheels = commanded(bench, "twist_B", twist)
+def test_twist_beyond_the_limits_keeps_its_curvature(twist):
+    v_WP, wheels = commanded("twist_B", twist)
     v, omega = body_twist(wheels, ROBOT)
     assert v * twist[1] == pytest.approx(twist[0] * omega)
     assert v * twist[0] + omega * twist[1] > 0.0
@@ -201,15 +197,11 @@ def test_twist_beyond_the_limits_keeps_its_curvature(bench, twist):
 
 @pytest.mark.parametrize("port", ["velocity_W", "twist_B"])
 @pytest.mark.parametrize("point", [[0.2, -0.1, 0.4], [0.6, 0.7, 0.4], [0.1, 4.5, -0.4]])
-def test_gradient_of_other_commands(bench, check_gradient, port, point):
+def test_gradient_of_other_commands(port, point):
     """Free, clamped, and with the wheels scaled."""
-
-    def respond(block, x):
-        at = bench(block, **{port: x[:2]}, pose_WB_estimated=[0.0, 0.0, x[2]])
-        return at.updated()
-
-    robot = RobotParameters(top_speed_m_s=0.7)
-    check_gradient(WheelCommand(command=port, robot=robot), respond, point)
+    block = WheelCommand(command=port, robot=RobotParameters(top_speed_m_s=0.7))
+    pose = [0.0, 0.0, point[2]]
+    assert_linearization(block, **{port: point[:2]}, pose_WB_estimated=pose)
 
 
 def test_a_vector_straight_back_is_turned_aside():

@@ -20,6 +20,8 @@ KINDS = {
     "_positions_m": (-1e3, 1e3),
     "_microphones_m": (-1e3, 1e3),
     "_waypoints_m": (-1e3, 1e3),
+    "_polygon_m": (-1e3, 1e3),
+    "_wall_m": (-1e3, 1e3),
     "_corner_m": (-1e3, 1e3),
     "_goal_m": (-1e3, 1e3),
     "_origin_m": (-1e3, 1e3),

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from pydrake.common.value import Value
-from pydrake.systems.analysis import Simulator
 
+from phonotaxis.testing import Bench
 from studies.support.bearing_trials import BearingTrial, hear_once
 from studies.support.listening_methods import PlaneListener, PrintedListener
 from systems.base.robot import RobotParameters
@@ -121,12 +120,9 @@ def test_it_asks_for_sound_only_while_it_listens():
 
 def test_frames_of_another_rate_are_refused():
     block = CrossPowerEstimator(microphones=MicArrayParameters(sample_rate_hz=32_000.0))
-    frame = next(frames(1, 48_000.0))
-    context = block.CreateDefaultContext()
-    block.GetInputPort("audio").FixValue(context, Value(frame))
-    block.GetInputPort("listening").FixValue(context, [2.0])
+    at = Bench(block, audio=next(frames(1, 48_000.0)), listening=2.0)
     with pytest.raises(InputError, match="48000"):
-        Simulator(block, context).AdvancePendingEvents()
+        at.tick()
 
 
 def test_three_microphones_at_the_start_are_refused():

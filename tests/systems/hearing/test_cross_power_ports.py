@@ -12,6 +12,7 @@ from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
+from phonotaxis.testing import Bench
 from systems.framework.block import RunFacts
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
@@ -167,12 +168,9 @@ def test_a_lost_microphone_is_named_and_three_still_hear(dead):
 
 
 def test_something_else_than_audio_is_refused():
-    estimator = block()
-    context = estimator.CreateDefaultContext()
-    estimator.GetInputPort("audio").FixValue(context, Value(object()))
-    estimator.GetInputPort("listening").FixValue(context, [2.0])
+    at = Bench(block(), audio=object(), listening=2.0)
     with pytest.raises(TypeError, match="connect the audio of a MicArray"):
-        Simulator(estimator, context).AdvanceTo(0.01)
+        at.tick()
 
 
 def test_a_loop_without_microphones_is_refused():

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.random import Generator, Philox
-from pydrake.common.value import Value
-from pydrake.systems.analysis import Simulator
 
 from diagrams import load_scenario, simulate
+from phonotaxis.testing import Bench
 from systems.framework.signals import AudioFrame
 from systems.hearing import localise
 from systems.hearing.multilateration import locate_source
@@ -60,19 +58,15 @@ class Ears:
     """An estimator that hears one frame after the other."""
 
     def __init__(self):
-        self.block = TDOAEstimator()
-        self.context = self.block.CreateDefaultContext()
+        self.bench = Bench(TDOAEstimator())
 
     def read(self, name):
-        port: Any = self.block.GetOutputPort(name)
-        return float(port.Eval(self.context)[0])
+        return float(self.bench.output(name)[0])
 
     def hear(self, rows):
         """Status of the range after a frame."""
         counts = np.round(100.0 * np.asarray(rows)).astype(np.int16)
-        audio = AudioFrame(counts, 512, FS, 0.025)
-        self.block.GetInputPort("audio").FixValue(self.context, Value(audio))
-        Simulator(self.block, self.context).AdvancePendingEvents()
+        self.bench.tick(audio=AudioFrame(counts, 512, FS, 0.025))
         status = self.read("range_status")
         assert self.read("range_valid") == (status == RANGED)
         assert self.read("detected") == (status not in {NOTHING_HEARD, REJECTED})

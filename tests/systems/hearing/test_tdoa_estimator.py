@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from numpy.random import Generator, Philox
 from pydantic import ValidationError
-from pydrake.common.value import Value
-from pydrake.systems.analysis import Simulator
 
+from phonotaxis.testing import Bench
 from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise
 from systems.framework.signals import AudioFrame
@@ -190,30 +189,10 @@ def audio(frame, **changes):
     return AudioFrame(counts=counts, **{**fields, **changes})
 
 
-def listen(block, frame):
-    """The block's context a tick after an audio frame."""
-    context = block.CreateDefaultContext()
-    hear(block, context, frame)
-    return context
-
-
-def hear(block, context, frame):
-    """Does the update at time 0 with a frame."""
-    block.GetInputPort("audio").FixValue(context, Value(frame))
-    Simulator(block, context).AdvancePendingEvents()
-
-
-def read(block, context):
-    return {
-        block.get_output_port(k).get_name(): block.get_output_port(k).Eval(context)
-        for k in range(block.num_output_ports())
-    }
-
-
 def test_ports_show_the_frame_after_one_tick():
-    block = TDOAEstimator()
-    assert read(block, block.CreateDefaultContext())["detected"] == 0.0
-    ports = read(block, listen(block, audio(heard(chirp, 30.0, 2.0, 30.0))))
+    at = Bench(TDOAEstimator(), audio=audio(heard(chirp, 30.0, 2.0, 30.0)))
+    assert at.output("detected") == 0.0
+    ports = at.tick().outputs()
     assert ports["detected"] == 1.0
     assert ports["range_valid"] == 1.0
     assert math.degrees(ports["source_bearing"][0]) == pytest.approx(30.0, abs=0.05)
@@ -226,27 +205,25 @@ def test_ports_show_the_frame_after_one_tick():
 
 def test_speed_of_sound_that_the_estimator_believes_in():
     """Far away sin(bearing) = c tau_13 / 2l: 3 % too fast reads 3 % too much."""
-    block = TDOAEstimator(sound_speed_m_s=1.03 * C)
-    context = listen(block, audio(heard(chirp, 30.0, 1e4, 30.0)))
-    bearing = read(block, context)["source_bearing"][0]
+    at = Bench(TDOAEstimator(sound_speed_m_s=1.03 * C))
+    at.tick(audio=audio(heard(chirp, 30.0, 1e4, 30.0)))
+    bearing = at.output("source_bearing")[0]
     assert math.sin(bearing) == pytest.approx(1.03 * 0.5, abs=2e-3)
 
 
 def test_a_sound_that_ends_is_read_no_longer():
-    block = TDOAEstimator()
-    context = listen(block, audio(heard(chirp, 30.0, 2.0, 30.0)))
-    assert read(block, context)["detected"] == 1.0
+    at = Bench(TDOAEstimator()).tick(audio=audio(heard(chirp, 30.0, 2.0, 30.0)))
+    assert at.output("detected") == 1.0
     noise = Generator(Philox(key=1)).standard_normal((3, N))
-    hear(block, context, audio(noise))
-    for values in read(block, context).values():
+    at.tick(audio=audio(noise))
+    for values in at.outputs().values():
         np.testing.assert_array_equal(values, 0.0)
 
 
 def test_nothing_heard_reads_zero():
-    block = TDOAEstimator()
     noise = Generator(Philox(key=1)).standard_normal((3, N))
-    context = listen(block, audio(noise))
-    for values in read(block, context).values():
+    at = Bench(TDOAEstimator()).tick(audio=audio(noise))
+    for values in at.outputs().values():
         np.testing.assert_array_equal(values, 0.0)
 
 
@@ -281,8 +258,7 @@ def test_microphones_anywhere_hear_the_source(places, bearing):
     noise = Generator(Philox(key=5)).standard_normal((len(places), N))
     rows = np.array([chirp(t - r / C) / r for r in ranges]) + 0.005 * noise
     block = TDOAEstimator(robot=RobotParameters(microphones_m=places))
-    context = listen(block, audio(rows))
-    ports = read(block, context)
+    ports = Bench(block).tick(audio=audio(rows)).outputs()
     assert ports["detected"] == 1.0
     assert ports["range_valid"] == 1.0
     # Six standard deviations of a small array's range.
@@ -292,11 +268,11 @@ def test_microphones_anywhere_hear_the_source(places, bearing):
 
 
 def test_wrong_audio_is_refused():
-    block = TDOAEstimator()
+    at = Bench(TDOAEstimator())
     with pytest.raises(TypeError, match=r"TDOAEstimator.*MicArray"):
-        listen(block, ("sound",))
+        at.tick(audio=("sound",))
     with pytest.raises(ValueError, match=r"TDOAEstimator.*48000"):
-        listen(block, audio(np.ones((3, N)), sample_rate_hz=48_000.0))
+        at.tick(audio=audio(np.ones((3, N)), sample_rate_hz=48_000.0))
 
 
 @pytest.mark.parametrize(

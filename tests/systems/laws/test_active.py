@@ -10,13 +10,13 @@ from hypothesis import given, strategies as st
 from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
+from phonotaxis.testing import assert_linearization, evaluate
 from systems.base.robot import RobotParameters
 from systems.laws.active import ActiveParameters, active_force
 from systems.laws.conventional import ConventionalParameters, conventional_force
 from systems.laws.impedance_controller import ActiveImpedanceController
 from systems.laws.parameters import AttractionParameters
-
-POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
+from tests.systems.laws.one_obstacle import ONE_OBSTACLE
 
 
 def law(K_0=10.0, ratio=4.0, D_0=3.0, damping_ratio=3.0, **settings):
@@ -126,8 +126,8 @@ def test_at_rest_a_far_obstacle_still_pushes():
     assert active_force(2.9, 0.0, gains) == pytest.approx(0.72, rel=0.01)
 
 
-def test_block_adds_attraction_and_repulsion(bench):
-    at = bench(
+def test_block_adds_attraction_and_repulsion():
+    outputs = evaluate(
         ActiveImpedanceController(gains=law()),
         p_WS_estimated=[3.175, 0.0],
         target_valid=[1.0],
@@ -138,24 +138,18 @@ def test_block_adds_attraction_and_repulsion(bench):
     )
     push = 4.0 + 1.0 * 0.72  # half reach, and d_ref mu_0 at rest
     np.testing.assert_allclose(
-        at.output("forces_W"), [2.0 * 1.8, 0.0, 0.0, -push], atol=1e-9
+        outputs["forces_W"], [2.0 * 1.8, 0.0, 0.0, -push], atol=1e-9
     )
 
 
 @pytest.mark.parametrize("velocity_term", ["printed", "closing"])
 @pytest.mark.parametrize("limit", [0.72, 20.0])
-def test_gradient(controller_bench, check_gradient, velocity_term, limit):
+def test_gradient(velocity_term, limit):
     """The obstacle moved at about 9 m/s: beyond the limit, and within."""
-
-    def respond(block, x):
-        at = controller_bench(block, x)
-        outputs = [*at.output("acceleration_W"), *at.output("forces_W")]
-        return [*outputs, *at.output("obstacle_speeds"), *at.updated()]
-
     block = ActiveImpedanceController(
         robot=RobotParameters(control_point_m=0.2, mass_kg=5.0),
         attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
         gains=law(speed_limit_m_s=limit),
         velocity_term=velocity_term,
     )
-    check_gradient(block, respond, POINT)
+    assert_linearization(block, **ONE_OBSTACLE)

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from phonotaxis.testing import assert_linearization, evaluate
 from systems.base.robot import RobotParameters
 from systems.laws.active_2017 import Active2017Parameters, active_2017_force
 from systems.laws.impedance_controller import ActiveImpedance2017Controller
 from systems.laws.parameters import AttractionParameters
+from tests.systems.laws.one_obstacle import ONE_OBSTACLE
 
 GAINS = Active2017Parameters(
     distance_gain_j=1.2,
@@ -23,7 +25,6 @@ GAINS = Active2017Parameters(
     damping_n_s_m=3.0,
     saturation_speed_m_s=0.72,
 )
-POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
 
 
 def slope(function, x, h=1e-6):
@@ -103,9 +104,9 @@ def test_each_gain_is_read_from_its_own_field():
     assert active_2017_force(0.7, 0.6, gains) == pytest.approx(1.10, rel=1e-12)
 
 
-def test_block_adds_attraction_and_repulsion(bench):
+def test_block_adds_attraction_and_repulsion():
     block = ActiveImpedance2017Controller(gains=GAINS)
-    at = bench(
+    outputs = evaluate(
         block,
         p_WS_estimated=[3.175, 0.0],
         target_valid=[1.0],
@@ -115,7 +116,7 @@ def test_block_adds_attraction_and_repulsion(bench):
         v_WP=[0.0, 0.0],
     )
     np.testing.assert_allclose(
-        at.output("forces_W"), [2.0 * 1.8, 0.0, 0.0, -3.0], atol=1e-9
+        outputs["forces_W"], [2.0 * 1.8, 0.0, 0.0, -3.0], atol=1e-9
     )
 
 
@@ -128,18 +129,12 @@ def test_block_adds_attraction_and_repulsion(bench):
         {"saturation_distance_m": 1.0, "saturation_speed_m_s": 20.0},
     ],
 )
-def test_gradient(controller_bench, check_gradient, velocity_term, saturation):
+def test_gradient(velocity_term, saturation):
     """The obstacle, at 0.61 m, moved at about 9 m/s."""
-
-    def respond(block, x):
-        at = controller_bench(block, x)
-        outputs = [*at.output("acceleration_W"), *at.output("forces_W")]
-        return [*outputs, *at.output("obstacle_speeds"), *at.updated()]
-
     block = ActiveImpedance2017Controller(
         robot=RobotParameters(control_point_m=0.2, mass_kg=5.0),
         attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
         gains=GAINS.model_copy(update=saturation),
         velocity_term=velocity_term,
     )
-    check_gradient(block, respond, POINT)
+    assert_linearization(block, **ONE_OBSTACLE)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from phonotaxis.testing import assert_linearization, evaluate
 from systems.base.robot import RobotParameters
 from systems.laws.conventional_2017 import (
     Conventional2017Parameters,
@@ -16,6 +17,7 @@ from systems.laws.conventional_2017 import (
 from systems.laws.impedance_controller import ConventionalImpedance2017Controller
 from systems.laws.parameters import AttractionParameters
 from systems.ranging.parameters import UltrasonicParameters
+from tests.systems.laws.one_obstacle import ONE_OBSTACLE
 
 GAINS = Conventional2017Parameters(distance_gain_j=1.2, damping_n_s_m=3.0)
 #: Least range of the sensors, m (Kim 2017, 4.2: 3 cm).
@@ -72,13 +74,13 @@ def test_slope_in_speed(s):
 @pytest.mark.parametrize(
     ("distance", "least", "push"), [(0.4, 0.03, 3.0), (0.02, 0.03, 40.0)]
 )
-def test_block_adds_attraction_and_repulsion(bench, distance, least, push):
+def test_block_adds_attraction_and_repulsion(distance, least, push):
     """The least range is the sensors'."""
     block = ConventionalImpedance2017Controller(
         gains=GAINS,
         sensors=UltrasonicParameters.model_validate({"minimum_range_m": least}),
     )
-    at = bench(
+    outputs = evaluate(
         block,
         p_WS_estimated=[3.175, 0.0],
         target_valid=[1.0],
@@ -88,20 +90,14 @@ def test_block_adds_attraction_and_repulsion(bench, distance, least, push):
         v_WP=[0.0, 0.0],
     )
     np.testing.assert_allclose(
-        at.output("forces_W"), [2.0 * 1.8, 0.0, 0.0, -push], atol=1e-9
+        outputs["forces_W"], [2.0 * 1.8, 0.0, 0.0, -push], atol=1e-9
     )
 
 
 @pytest.mark.parametrize("velocity_term", ["printed", "closing"])
 @pytest.mark.parametrize("least", [0.03, 1.0])
-def test_gradient(controller_bench, check_gradient, velocity_term, least):
+def test_gradient(velocity_term, least):
     """The obstacle is at 0.61 m."""
-
-    def respond(block, x):
-        at = controller_bench(block, x)
-        outputs = [*at.output("acceleration_W"), *at.output("forces_W")]
-        return [*outputs, *at.output("obstacle_speeds"), *at.updated()]
-
     block = ConventionalImpedance2017Controller(
         robot=RobotParameters(control_point_m=0.2, mass_kg=5.0),
         attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
@@ -109,4 +105,4 @@ def test_gradient(controller_bench, check_gradient, velocity_term, least):
         velocity_term=velocity_term,
         sensors=UltrasonicParameters.model_validate({"minimum_range_m": least}),
     )
-    check_gradient(block, respond, [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1])
+    assert_linearization(block, **ONE_OBSTACLE)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from phonotaxis.testing import Bench, evaluate
 from systems.laws.active import ACTIVE
 from systems.laws.impedance_controller import (
     ActiveImpedanceController,
@@ -81,23 +82,23 @@ def test_repulsion_points_away(direction, distance):
     np.testing.assert_allclose(force, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_forces_of_several_vectors_add(bench):
+def test_forces_of_several_vectors_add():
     block = RadialLawController(law=lambda c, s, _: 1.0 / c)
-    at = on_bench(bench, block)
+    at = on_bench(block)
     see(at, (1.0, 1.0, 0.0), (2.0, 0.0, 0.5))
     np.testing.assert_allclose(at.output("forces_W")[2:], [-1.0, -2.0])
     np.testing.assert_array_equal(at.output("obstacle_speeds"), np.zeros(3))
 
 
-def make_bench(bench, velocity_term="printed", *, pose=(0.0, 0.0, 0.0)):
+def make_bench(velocity_term="printed", *, pose=(0.0, 0.0, 0.0)):
     """A controller whose force is s itself, so that s shows everywhere."""
     block = RadialLawController(velocity_term=velocity_term, law=lambda c, s, _: s)
-    return on_bench(bench, block, pose=pose)
+    return on_bench(block, pose=pose)
 
 
-def on_bench(bench, block, *, pose=(0.0, 0.0, 0.0)):
+def on_bench(block, *, pose=(0.0, 0.0, 0.0)):
     """A controller that sees nothing, 5 m from its target."""
-    return bench(
+    return Bench(
         block,
         p_WS_estimated=[5.0, 0.0],
         target_valid=[1.0],
@@ -117,16 +118,15 @@ def see(at, *vectors, pose=None):
     values = {"collision_vectors_B": C, "features": features}
     if pose is not None:
         values["pose_WB_estimated"] = pose
-    for name, value in values.items():
-        at.block.GetInputPort(name).FixValue(at.context, value)
+    at.set(**values)
 
 
 @pytest.mark.parametrize(
     ("velocity_term", "approach", "retreat"),
     [("printed", 0.4, 0.4), ("closing", 0.4, 0.0)],
 )
-def test_speed_over_a_tick(bench, velocity_term, approach, retreat):
-    at = make_bench(bench, velocity_term)
+def test_speed_over_a_tick(velocity_term, approach, retreat):
+    at = make_bench(velocity_term)
     speeds = []
     for x in (1.0, 0.99, 1.0):
         see(at, (2, x, 0.0))
@@ -135,8 +135,8 @@ def test_speed_over_a_tick(bench, velocity_term, approach, retreat):
     assert speeds == pytest.approx([0.0, approach, retreat], abs=1e-9)
 
 
-def test_speed_is_zero_at_the_first_echo_and_after_a_lost_one(bench):
-    at = make_bench(bench)
+def test_speed_is_zero_at_the_first_echo_and_after_a_lost_one():
+    at = make_bench()
     speeds = []
     for vectors in ([(2, 1.0, 0.0)], [], [(2, 0.5, 0.0)], [(2, 0.49, 0.0)]):
         see(at, *vectors)
@@ -145,9 +145,9 @@ def test_speed_is_zero_at_the_first_echo_and_after_a_lost_one(bench):
     assert speeds == pytest.approx([0.0, 0.0, 0.0, 0.4], abs=1e-9)
 
 
-def test_speed_is_zero_where_the_feature_changes(bench):
+def test_speed_is_zero_where_the_feature_changes():
     """C jumps by 0.5 m in a tick: a change of sensor, not 20 m/s."""
-    at = make_bench(bench)
+    at = make_bench()
     see(at, (2, 1.0, 0.0))
     at.tick()
     see(at, (4, 0.5, 0.0))
@@ -157,8 +157,8 @@ def test_speed_is_zero_where_the_feature_changes(bench):
     assert at.output("obstacle_speeds")[0] == pytest.approx(0.4)
 
 
-def test_features_are_followed_from_slot_to_slot(bench):
-    at = make_bench(bench)
+def test_features_are_followed_from_slot_to_slot():
+    at = make_bench()
     see(at, (1, 1.0, 0.0), (3, 0.0, -2.0))
     at.tick()
     see(at, (3, 0.0, -1.98), (1, 0.99, 0.0))
@@ -166,20 +166,20 @@ def test_features_are_followed_from_slot_to_slot(bench):
     np.testing.assert_allclose(speeds, [0.8, 0.4, 0.0], atol=1e-9)
 
 
-def test_turning_on_the_spot_is_no_motion_of_the_obstacle(bench):
+def test_turning_on_the_spot_is_no_motion_of_the_obstacle():
     """s is taken in the axes of W: the same C_W seen from a turned robot."""
-    at = make_bench(bench)
+    at = make_bench()
     see(at, (2, 1.0, 0.0), pose=[0.0, 0.0, 0.0])
     at.tick()
     see(at, (2, math.cos(0.2), -math.sin(0.2)), pose=[0.0, 0.0, 0.2])
     assert at.output("obstacle_speeds")[0] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_collision_vector_is_only_rotated(bench):
+def test_collision_vector_is_only_rotated():
     """Eq. 16 adds the robot's place; |C| would then be measured from W's origin."""
     block = RadialLawController(law=lambda c, s, _: 1.0 / c)
     pose = [100.0, -50.0, math.pi / 2]
-    at = bench(
+    outputs = evaluate(
         block,
         p_WS_estimated=[0.0, 0.0],
         target_valid=[1.0],
@@ -188,11 +188,11 @@ def test_collision_vector_is_only_rotated(bench):
         pose_WB_estimated=pose,
         v_WP=[0.0, 0.0],
     )
-    np.testing.assert_allclose(at.output("forces_W")[2:], [0.0, -2.0], atol=1e-9)
+    np.testing.assert_allclose(outputs["forces_W"][2:], [0.0, -2.0], atol=1e-9)
 
 
-def test_acceleration_is_the_sum_over_the_mass(bench):
-    at = make_bench(bench)
+def test_acceleration_is_the_sum_over_the_mass():
+    at = make_bench()
     see(at, (2, 1.0, 0.0))
     at.tick()
     see(at, (2, 0.99, 0.0))
@@ -204,11 +204,11 @@ def test_acceleration_is_the_sum_over_the_mass(bench):
     )
 
 
-def test_a_law_of_the_catalog_and_its_name_are_one_block(bench):
+def test_a_law_of_the_catalog_and_its_name_are_one_block():
     named, general = ActiveImpedanceController(), ImpedanceController(law=ACTIVE)
     pushes = []
     for block in (named, general):
-        at = on_bench(bench, block)
+        at = on_bench(block)
         see(at, (2, 0.4, 0.1))
         pushes.append(at.output("forces_W"))
     np.testing.assert_array_equal(*pushes)
@@ -222,9 +222,9 @@ def test_a_named_law_takes_no_other():
         ActiveImpedanceController(law=ACTIVE)
 
 
-def test_unseen_slots_push_nothing(bench):
+def test_unseen_slots_push_nothing():
     """And leave the pull: 2 N/m times 3.625 m, as above."""
-    at = make_bench(bench)
+    at = make_bench()
     np.testing.assert_allclose(at.output("forces_W"), [7.25, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(at.output("acceleration_W"), [7.25 / 3.94, 0.0])
     np.testing.assert_array_equal(at.output("obstacle_speeds"), np.zeros(3))

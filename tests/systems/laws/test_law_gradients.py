@@ -11,6 +11,7 @@ import pytest
 from hypothesis import assume, given, strategies as st
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
+from phonotaxis.testing import evaluate
 from systems import (
     ActiveImpedance2017Controller,
     ActiveImpedanceController,
@@ -170,16 +171,14 @@ DUALS = {law: block.ToAutoDiffXd() for law, (block, _) in BLOCKS.items()}
 
 @pytest.mark.parametrize("law", LAWS)
 @given(c=st.floats(0.05, 3.0), direction=st.floats(-math.pi, math.pi))
-def test_block_s_stiffness_is_radial_slope_and_tangential_secant(
-    law, bench, c, direction
-):
+def test_block_s_stiffness_is_radial_slope_and_tangential_secant(law, c, direction):
     """F = -f(c) C/c has dF/dC = -f' u u' - (f/c)(1 - u u'), u = C/c; s = 0."""
     force, slopes, _, kink, _ = LAWS[law]
     gains = BLOCKS[law][1]
     assume(kink is None or abs(c - place(kink, gains)) > KINK)
     u = np.array([math.cos(direction), math.sin(direction)])
     C = InitializeAutoDiff(c * u).ravel()
-    at = bench(
+    outputs = evaluate(
         DUALS[law],
         p_WS_estimated=[5.0, 0.0],
         target_valid=[0.0],
@@ -189,7 +188,7 @@ def test_block_s_stiffness_is_radial_slope_and_tangential_secant(
         v_WP=[0, 0],
     )
     nothing = 0.0 * C[0]
-    F_b = np.array([[F + nothing] for F in at.output("forces_W")[2:]])
+    F_b = np.array([[F + nothing] for F in outputs["forces_W"][2:]])
     radial, along = slopes(c, 0.0, gains)[0], np.outer(u, u)
     expected = -radial * along - force(c, 0.0, gains) / c * (np.eye(2) - along)
     np.testing.assert_allclose(ExtractGradient(F_b), expected, rtol=1e-6, atol=1e-6)

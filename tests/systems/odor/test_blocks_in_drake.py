@@ -11,6 +11,7 @@ from numba import njit
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from phonotaxis.testing import evaluate, run
 from systems.framework.block import RunFacts
 from systems.odor import airflow_sensors
 from systems.odor.airflow_sensors import AirflowSensors
@@ -111,33 +112,25 @@ def test_in_drake_a_gas_sensor_is_a_first_order_lag():
     """All of the floor at C = 3: after t, r + (1 - r) exp(-t / 2.5), r = 4^-0.7155."""
     quiet = GasSensorParameters(noise=0.0, mismatch=0.0)
     block = GasSensorArray(parameters=quiet)
-    context = block.CreateDefaultContext()
     plume = np.zeros(PLUME_SIZE)
     plume[0] = 3.0
-    block.GetInputPort("plume").FixValue(context, plume)
-    block.GetInputPort("pose_WB").FixValue(context, np.array(POSE))
-    simulator, ratio = Simulator(block, context), block.GetOutputPort("gas_ratio")
-    simulator.AdvanceTo(5.0 - 0.5 * TICK_S)  # 200 updates, at 0 to 4.975 s
+    history = run(block, 5.0, plume=plume, pose_WB=POSE)
     rest = 4.0**-0.7155
-    state = context.get_discrete_state(0).CopyToVector()[:3]
+    state = history.state[-1, :3]  # after 200 updates
     assert state == pytest.approx([rest + (1.0 - rest) * math.exp(-2.0)] * 3)
     far = rest + (1.0 - rest) * math.exp(-5.025 / 2.5)  # a tick's work ahead of state
-    assert ratio.Eval(context) == pytest.approx([far] * 3)
-    concentration = block.GetOutputPort("gas_concentration").Eval(context)
-    assert concentration == pytest.approx([3.0] * 3)
+    assert history["gas_ratio"][-1] == pytest.approx([far] * 3)
+    assert history["gas_concentration"][-1] == pytest.approx([3.0] * 3)
 
 
 def test_in_drake_airflow_is_a_cosine_about_each_sensor(monkeypatch):
     """A wind of 1 m/s along x and a heading of 165 deg: from 15 deg on the left."""
     monkeypatch.setattr(airflow_sensors, "_NOISE_SHARE", 0.0)
-    block = AirflowSensors()
-    context = block.CreateDefaultContext()
     wind = WindField(parameters=WindParameters(kind="uniform")).step.state
-    block.GetInputPort("wind").FixValue(context, np.array(wind))
-    pose = np.array([0.0, 0.0, math.radians(165.0)])
-    block.GetInputPort("pose_WB").FixValue(context, pose)
+    pose = [0.0, 0.0, math.radians(165.0)]
+    outputs = evaluate(AirflowSensors(), wind=wind, pose_WB=pose)
     expected = [3.0 * math.cos(math.radians(a)) for a in (30.0, 60.0)]
-    assert block.GetOutputPort("airflow").Eval(context) == pytest.approx(expected)
+    assert outputs["airflow"] == pytest.approx(expected)
 
 
 def test_a_run_draws_wind_plume_and_sensors_anew_from_its_own_seed():

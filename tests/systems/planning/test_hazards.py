@@ -10,7 +10,7 @@ import pytest
 from systems.planning.hazards import make_hazards, pick_hazards, track_hazards
 from systems.planning.looks import HazardSensors
 from systems.safety.free_space import make_free_space
-from systems.world.geometry import fan_ranges
+from systems.world.cones import fan_ranges
 
 TICK_S, CELLS, CELL_M, AHEAD_M, FARTHEST_M = 0.025, 240, 0.05, 0.175, 3.0
 AXES, HALVES = np.radians([30.0, 0.0, -30.0]), np.full(3, math.radians(15.0))
@@ -56,7 +56,7 @@ def look(
     for tick in ticks:
         time = tick * TICK_S
         pose = np.array(pose_at(time))
-        bodies = np.array(bodies_at(time), dtype=float).reshape(-1, 5)
+        bodies = np.array(bodies_at(time), dtype=float).reshape(-1, 6)
         true = fan_ranges(pose, bodies, AXES, PLACES, HALVES, AHEAD_M)
         echo = (true <= FARTHEST_M).astype(float)
         ranges = np.where(echo > 0.5, true + noise_m * rng.normal(size=3), FARTHEST_M)
@@ -71,7 +71,7 @@ def weaving(time):
 
 def crossing(time):
     """A post of 5 cm that crosses ahead at 0.36 m/s."""
-    return [(2.0 - 0.1 * time, 1.2 - 0.35 * time, 0.0, 0.05, 0.05)]
+    return [(2.0 - 0.1 * time, 1.2 - 0.35 * time, 0.0, 0.05, 0.05, 0.0)]
 
 
 def estimate(hazards):
@@ -121,7 +121,7 @@ def test_what_rests_is_never_tracked(turn, noise_m):
     space, hazards = floor(), make_hazards(3)
     for box in boxes:
         take(space, box)
-    bodies = [(x, y, 0.0, length, width) for x, y, length, width in boxes]
+    bodies = [(x, y, 0.0, length, width, 0.0) for x, y, length, width in boxes]
 
     def pose_at(time):
         return 0.3 * time, 0.0, turn * math.sin(math.tau * time / 2.7)
@@ -138,7 +138,7 @@ def test_what_is_followed_is_not_tracked():
     hazards = make_hazards(3)
     for tick in range(120):
         x, y = 1.5 + 0.3 * tick * TICK_S, 0.1
-        body = [(x, y, 0.0, 0.29, 0.29)]
+        body = [(x, y, 0.0, 0.29, 0.29, 0.0)]
         look(
             hazards,
             [tick],

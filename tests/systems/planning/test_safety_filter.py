@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
+from phonotaxis.testing import Bench
 from systems.base.robot import RobotParameters
 from systems.framework.block import Step
 from systems.planning.safety_filter import SafetyFilter
@@ -176,21 +176,16 @@ def test_the_block_does_not_wind_up():
 
 def test_in_drake_it_is_the_same():
     block = SafetyFilter(robot=BURGER)
-    context = block.CreateDefaultContext()
     crossing = objects_of([1, 0.5, 0.1, 0.0, -0.1, 1, 0.2])
     inputs = {
         "acceleration_W": [1.0, 0.5],
         "pose_WB_estimated": [0.0, 0.0, 0.4],
         "objects_W": crossing,
     }
-    for name, value in inputs.items():
-        block.GetInputPort(name).FixValue(context, np.array(value))
-    state = [0.0] * 6
+    at, state = Bench(block, **inputs), [0.0] * 6
     for _ in range(5):
-        changed = block.EvalUniquePeriodicDiscreteUpdate(context)
-        context.SetDiscreteState(changed)
+        at.tick()
         values = [list(value) for value in inputs.values()]
         block.step.step(0, state, values, (), block.step.numbers)
-    for port, at in (("wheel_speeds", 0), ("v_WP", 2), ("filter_report", 4)):
-        found: Any = block.GetOutputPort(port).Eval(context)
-        assert found.tolist() == state[at : at + 2]
+    for port, k in (("wheel_speeds", 0), ("v_WP", 2), ("filter_report", 4)):
+        assert at.output(port).tolist() == state[k : k + 2]

@@ -144,7 +144,8 @@ def driven(
         (ticks, bodies) distances of P from each body, m; (ticks, 4) wheel speeds that
         were commanded, rad/s, and speeds of P that the filter gave, m/s.
     """
-    bodies = np.array(bodies, dtype=float).reshape(-1, 5)
+    boxes = np.array(bodies, dtype=float).reshape(-1, 5)
+    bodies = np.column_stack([boxes, np.zeros(len(boxes))])
     sensor = IdealObjectSensor(robot=BURGER, bodies=len(bodies)).step
     command = SafetyFilter(robot=BURGER).step
     seen, state = np.array(sensor.state), list(command.state)
@@ -261,7 +262,7 @@ def test_two_robots_that_meet_do_not_touch():
 
 def meeting(starts: Any) -> float:
     """Least clearance of two robots' bodies that drive on at 0.15 m/s, m."""
-    size = [BURGER.length_m, BURGER.width_m]
+    size = [BURGER.length_m, BURGER.width_m, 0.0]
     poses, wheels = starts.copy(), np.zeros((2, 2))
     courses = 0.15 * np.column_stack([np.cos(starts[:, 2]), np.sin(starts[:, 2])])
     sensors = [

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from phonotaxis.testing import assert_linearization, evaluate
 from systems.ranging.collision_vector import (
     CollisionVector,
     collision_vectors,
@@ -163,23 +164,23 @@ def test_no_vector_is_longer_than_the_nearest_echo_or_shorter_than_its_foot(
         assert min(lengths) >= min(heard) * math.cos(math.radians(15)) - 1e-12
 
 
-def test_ports_of_one_pair(bench):
-    at = bench(CollisionVector(), ranges=[0.6, 0.6, 3.0], echo=[1, 1, 0])
+def test_ports_of_one_pair():
+    outputs = evaluate(CollisionVector(), ranges=[0.6, 0.6, 3.0], echo=[1, 1, 0])
     c = 0.6 * math.cos(math.radians(15))
     x, y = c * math.cos(math.radians(15)), c * math.sin(math.radians(15))
     np.testing.assert_allclose(
-        at.output("collision_vectors_B"), [x, y, 0, 0, 0, 0], atol=1e-15
+        outputs["collision_vectors_B"], [x, y, 0, 0, 0, 0], atol=1e-15
     )
-    np.testing.assert_array_equal(at.output("mask"), [1, 0, 0])
-    np.testing.assert_array_equal(at.output("features"), [4, 0, 0])
+    np.testing.assert_array_equal(outputs["mask"], [1, 0, 0])
+    np.testing.assert_array_equal(outputs["features"], [4, 0, 0])
 
 
-def test_a_range_without_echo_means_nothing(bench):
-    at = bench(CollisionVector(), ranges=[0.1, 0.6, 0.1], echo=[0, 1, 0])
-    np.testing.assert_allclose(at.output("collision_vectors_B")[:2], [0.6, 0.0])
+def test_a_range_without_echo_means_nothing():
+    outputs = evaluate(CollisionVector(), ranges=[0.1, 0.6, 0.1], echo=[0, 1, 0])
+    np.testing.assert_allclose(outputs["collision_vectors_B"][:2], [0.6, 0.0])
 
 
-def test_sensors_places_and_axes_are_used(bench):
+def test_sensors_places_and_axes_are_used():
     sensors = UltrasonicParameters(
         sensors=(
             RangeSensorParameters(axis_deg=90.0, position_m=(0.0, 0.3)),
@@ -188,54 +189,42 @@ def test_sensors_places_and_axes_are_used(bench):
         )
     )
     block = CollisionVector(parameters=SUM, sensors=sensors)
-    at = bench(block, ranges=[1.0, 2.0, 1.5], echo=[1, 1, 1])
+    outputs = evaluate(block, ranges=[1.0, 2.0, 1.5], echo=[1, 1, 1])
     np.testing.assert_allclose(
-        at.output("collision_vectors_B"), [0, 1.3, 2.1, 0, 0, -1.8], atol=1e-15
+        outputs["collision_vectors_B"], [0, 1.3, 2.1, 0, 0, -1.8], atol=1e-15
     )
 
 
 @pytest.mark.parametrize("parameters", [PAPER, NEAREST, SUM])
 @pytest.mark.parametrize("ranges", [(0.6, 0.5, 0.8), (0.9, 0.7, 0.45), (2.0, 0.4, 1.0)])
-def test_gradient(bench, check_gradient, parameters, ranges):
+def test_gradient(parameters, ranges):
     sensors = UltrasonicParameters(
         sensors=tuple(RangeSensorParameters(axis_deg=a) for a in (35.0, 5.0, -30.0))
     )
+    block = CollisionVector(parameters=parameters, sensors=sensors)
+    assert_linearization(block, ranges=ranges, echo=[1, 1, 1], hold=["echo"])
 
-    def respond(block, x):
-        at = bench(block, ranges=x, echo=[1, 1, 1])
-        return [*at.output("collision_vectors_B"), *at.output("features")]
 
-    check_gradient(
-        CollisionVector(parameters=parameters, sensors=sensors), respond, ranges
+def test_gradient_of_ranges_that_are_carried_on():
+    """By the ranges, and by the poses now and in the two ticks before."""
+    sensors = UltrasonicParameters(firing="sequential")
+    assert_linearization(
+        CollisionVector(parameters=SUM, sensors=sensors),
+        state=[0.29, -0.21, 0.38, 0.27, -0.2, 0.35],
+        ranges=[0.9, 0.7, 0.8],
+        echo=[1, 1, 1],
+        range_ages=[0.05, 0.025, 0.0],
+        pose_WB_estimated=[0.3, -0.2, 0.4],
+        hold=["echo", "range_ages"],
     )
 
 
-def test_gradient_of_ranges_that_are_carried_on(bench, check_gradient):
-    """By the ranges, and by the poses now and in the two ticks before."""
-    sensors = UltrasonicParameters(firing="sequential")
-
-    def respond(block, x):
-        at = bench(
-            block,
-            state=x[6:12],
-            ranges=x[0:3],
-            echo=[1, 1, 1],
-            range_ages=[0.05, 0.025, 0.0],
-            pose_WB_estimated=x[3:6],
-        )
-        return [*at.output("collision_vectors_B"), *at.updated()]
-
-    poses = [0.3, -0.2, 0.4, 0.29, -0.21, 0.38, 0.27, -0.2, 0.35]
-    block = CollisionVector(parameters=SUM, sensors=sensors)
-    check_gradient(block, respond, [0.9, 0.7, 0.8, *poses])
-
-
-def test_a_held_range_is_turned_and_moved_with_the_robot(bench):
+def test_a_held_range_is_turned_and_moved_with_the_robot():
     """Seen 1 m ahead of P at the origin; P then moved 0.2 m on and B turned left."""
     block = CollisionVector(
         parameters=NEAREST, sensors=UltrasonicParameters(firing="sequential")
     )
-    at = bench(
+    outputs = evaluate(
         block,
         state=[-0.175, 0.0, 0.0, 9.0, 9.0, 9.0],
         ranges=[3.0, 1.0, 3.0],
@@ -243,5 +232,5 @@ def test_a_held_range_is_turned_and_moved_with_the_robot(bench):
         range_ages=[0.0, 0.025, 0.05],
         pose_WB_estimated=[0.2, -0.175, math.pi / 2],
     )
-    C = at.output("collision_vectors_B")[:2]
+    C = outputs["collision_vectors_B"][:2]
     np.testing.assert_allclose(C, [0.0, -0.8], atol=1e-12)

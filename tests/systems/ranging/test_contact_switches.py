@@ -19,7 +19,7 @@ def felt(
     box=(5.0, 5.0, 0.0),
     compiled=False,
     width=0.1,
-    size=(0.2, 0.2),
+    size=(0.2, 0.2, 0.0),
     robot=BODY,
     faults=(),
 ):
@@ -86,11 +86,17 @@ def test_a_post_near_the_middle_closes_both(y, switches):
 def test_a_wall_of_ten_meters_is_felt_at_its_end_too(gap, switches, compiled):
     """Across the front, 0.1 m ahead: its middle is 4.8 m to the side."""
     wall = (0.1 + gap + 0.05, 4.8, 0.0)
-    assert felt((0, 0, 0), box=wall, size=(0.1, 10.0), compiled=compiled) == switches
+    assert (
+        felt((0, 0, 0), box=wall, size=(0.1, 10.0, 0.0), compiled=compiled) == switches
+    )
 
 
 def test_a_robot_longer_than_two_meters_feels_ahead_of_its_front():
     """A post at its front, which is 1.5 m from the origin of B."""
     long = RobotParameters(length_m=3.0, width_m=0.3)
-    assert felt((0, 0, 0), box=(1.559, 0.0, 0.0), size=(0.1, 0.1), robot=long)[0] == 1
-    assert felt((0, 0, 0), box=(1.561, 0.0, 0.0), size=(0.1, 0.1), robot=long)[0] == 0
+    assert (
+        felt((0, 0, 0), box=(1.559, 0.0, 0.0), size=(0.1, 0.1, 0.0), robot=long)[0] == 1
+    )
+    assert (
+        felt((0, 0, 0), box=(1.561, 0.0, 0.0), size=(0.1, 0.1, 0.0), robot=long)[0] == 0
+    )

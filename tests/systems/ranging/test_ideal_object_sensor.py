@@ -20,6 +20,7 @@ ROBOT_PARAMETERS = RobotParameters(control_point_m=0.1)
 def seen(bodies: Any, ticks: int = 1, robots: Any = (), **own: Any) -> Any:
     """(ticks, 8, 8) of bodies (x, y, theta, vx, vy, omega, length, width)."""
     bodies = np.reshape(np.array(bodies, dtype=float), (-1, 8))
+    sizes = np.pad(bodies[:, 6:], ((0, 0), (0, 1)))
     block = IdealObjectSensor(
         parameters=ObjectSensorParameters(**own),
         robot=ROBOT_PARAMETERS,
@@ -31,7 +32,7 @@ def seen(bodies: Any, ticks: int = 1, robots: Any = (), **own: Any) -> Any:
     state = np.array(step.state)
     for tick in range(ticks):
         poses = bodies[:, :3] + 0.025 * tick * bodies[:, 3:6]
-        inputs = [np.zeros(3), poses.ravel(), bodies[:, 6:].ravel()]
+        inputs = [np.zeros(3), poses.ravel(), sizes.ravel()]
         outputs = [[0.0] * 64]
         step.step(tick, state, inputs, outputs, step.numbers)
         rows.append(np.reshape(outputs[0], (8, 8)))

@@ -11,6 +11,7 @@ import pytest
 
 from diagrams import dump_scenario, load_scenario, simulate
 from diagrams.scenario.warnings.guarantees import guarantees
+from phonotaxis.testing import Bench
 from systems import FreeSpaceMap, SensingMonitor, UltrasonicArray
 from systems.framework.input_error import InputError
 from systems.ranging.parameters import RangeSensorParameters, UltrasonicParameters
@@ -116,7 +117,9 @@ def test_errors_name_the_field_of_the_sensor(setting, field):
 def test_each_cone_has_its_own_width():
     """A post 38 deg to the left, 0.8 m from P: within the wide cone alone."""
     angle = math.radians(38.0)
-    post = np.array([[0.8 * math.cos(angle), 0.8 * math.sin(angle), angle, 0.02, 0.02]])
+    post = np.array(
+        [[0.8 * math.cos(angle), 0.8 * math.sin(angle), angle, 0.02, 0.02, 0.0]]
+    )
     wide = RangeSensorParameters(axis_deg=-1.0, beam_half_angle_deg=40.0)
     both = UltrasonicParameters(sensors=(RangeSensorParameters(), wide))
     found = cone_ranges([0.0, 0.0, 0.0], post, both, 0.0)
@@ -124,14 +127,14 @@ def test_each_cone_has_its_own_width():
     assert found[1] == pytest.approx(0.79, abs=1e-9)
 
 
-def test_each_sensor_has_its_own_noise_and_limits(bench):
+def test_each_sensor_has_its_own_noise_and_limits():
     """Closed forms: a wall 0.5 m ahead, and standard deviations of 1, 1 and 20 mm."""
     block = UltrasonicArray(parameters=KINDS, obstacle_count=1, seed=3)
-    at = bench(
+    at = Bench(
         block,
         pose_WB=[0.0, 0.0, 0.0],
         poses_WO=[0.175 + 0.55, 0.0, 0.0],
-        sizes=[0.1, 9.0],
+        sizes=[0.1, 9.0, 0.0],
         pose_WS=[-50.0, 0.0, 0.0],
     )
     rows = []
@@ -144,7 +147,7 @@ def test_each_sensor_has_its_own_noise_and_limits(bench):
     assert np.all(np.abs(errors.mean(axis=0)) < 5.0 * wanted / math.sqrt(1500))
     np.testing.assert_allclose(errors.std(axis=0), wanted, rtol=5 / math.sqrt(3000))
     # At 1.2 m the middle sensor hears nothing, and says 1 m.
-    at.block.GetInputPort("poses_WO").FixValue(at.context, [0.175 + 1.25, 0.0, 0.0])
+    at.set(poses_WO=[0.175 + 1.25, 0.0, 0.0])
     assert at.output("echo").tolist() == [1.0, 0.0, 1.0]
     assert at.output("ranges")[1] == 1.0
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from phonotaxis.testing import Bench
 from systems.base.robot import RobotParameters
 from systems.ranging.beam_groups import EXTENT, NEAR_X, NEAR_Y, OPEN, group_beams
 from systems.ranging.object_detector import ObjectDetector, object_detector_step
@@ -50,7 +51,8 @@ class Driven:
 
     def look(self, *bodies: Any, pose: Any = REST) -> Any:
         """The same of rectangles."""
-        rectangles = np.array(bodies, dtype=float).reshape(-1, 5)
+        boxes = np.array(bodies, dtype=float).reshape(-1, 5)
+        rectangles = np.pad(boxes, ((0, 0), (0, 1)))
         return self.see(cone_ranges(pose, rectangles, self.sensors, EPSILON), pose)
 
 
@@ -232,7 +234,7 @@ def test_a_wall_rests_however_the_noise_of_beams_moves_its_nearest_point():
     What is known of such a wall towards P alone is good to noise/sqrt(ticks).
     """
     noise = np.random.default_rng(1)
-    sensors, rectangles = ring(72), np.array([[0.55, 0.0, 0.0, 0.1, 1.4]])
+    sensors, rectangles = ring(72), np.array([[0.55, 0.0, 0.0, 0.1, 1.4, 0.0]])
     driven = Driven(sensors)
     for tick in range(400):
         t = 0.025 * tick
@@ -283,7 +285,7 @@ def test_held_ranges_stay_where_they_were_seen():
     driven, held = Driven(sensors), [math.inf] * 3
     for tick in range(31):
         pose = 0.02 * tick - EPSILON, 0.0, 0.0
-        wall = np.array([[1.6, 0.0, 0.0, 0.2, 9.0]])
+        wall = np.array([[1.6, 0.0, 0.0, 0.2, 9.0, 0.0]])
         held[tick % 3] = cone_ranges(pose, wall, sensors, EPSILON)[tick % 3]
         ages = [0.025 * ((tick - k) % 3) for k in range(3)]
         objects = driven.see(held, pose, ages)
@@ -302,10 +304,10 @@ def test_no_more_than_eight_and_the_nearest():
     np.testing.assert_allclose(away, np.linspace(0.55, 1.25, 8), atol=2e-3)
 
 
-def test_drake_compiled_code_and_the_step_agree(bench):
+def test_drake_compiled_code_and_the_step_agree():
     sensors = ring(36)
     compiled, plain = njit(object_detector_step), Driven(sensors)
-    at = bench(
+    at = Bench(
         plain.block,
         ranges=[2.0] * 36,
         echo=[0.0] * 36,
@@ -315,9 +317,8 @@ def test_drake_compiled_code_and_the_step_agree(bench):
     state = np.array(plain.state)
     for tick in range(30):
         pose = 0.004 * tick - EPSILON, 0.0, 0.01 * tick
-        bodies = np.array(
-            [[1.4 - 0.005 * tick, 0.2, 0.3, 0.4, 0.3], [0.0, 1.0, 0.0, 9.0, 0.2]]
-        )
+        box = [1.4 - 0.005 * tick, 0.2, 0.3, 0.4, 0.3, 0.0]
+        bodies = np.array([box, [0.0, 1.0, 0.0, 9.0, 0.2, 0.0]])
         ranges = cone_ranges(pose, bodies, sensors, EPSILON)
         expected = plain.see(ranges, pose)
         echo = (ranges <= 2.0).astype(float)
@@ -326,8 +327,7 @@ def test_drake_compiled_code_and_the_step_agree(bench):
         compiled(tick, state, inputs, outputs, plain.block.step.numbers)
         np.testing.assert_array_equal(outputs[0].reshape(8, 8), expected)
         names = "ranges", "echo", "range_ages", "pose_WB_estimated"
-        for name, values in zip(names, inputs, strict=True):
-            at.block.GetInputPort(name).FixValue(at.context, values)
+        at.set(**dict(zip(names, inputs, strict=True)))
         np.testing.assert_array_equal(at.output("objects_W"), expected.ravel())
         at.tick()
     np.testing.assert_array_equal(state, plain.state)

@@ -48,7 +48,7 @@ def test_a_ring_sees_a_body_at_every_bearing(name):
     for degrees in np.arange(0.0, 360.0, 1.0):
         angle = math.radians(degrees)
         x, y = POSE[0] + 1.5 * math.cos(angle), POSE[1] + 1.5 * math.sin(angle)
-        post = np.array([[x, y, angle, 0.02, 0.02]])
+        post = np.array([[x, y, angle, 0.02, 0.02, 0.0]])
         found = cone_ranges(POSE, post, ring, CONTROL_POINT_M)
         assert found.min() == pytest.approx(1.49, abs=1e-9), degrees
         heading = ring.axes[int(np.argmin(found))] + POSE[2]
@@ -58,7 +58,7 @@ def test_a_ring_sees_a_body_at_every_bearing(name):
 
 
 def test_the_papers_three_do_not():
-    behind = np.array([[POSE[0] - 1.5, POSE[1], 0.0, 0.02, 0.02]])
+    behind = np.array([[POSE[0] - 1.5, POSE[1], 0.0, 0.02, 0.02, 0.0]])
     found = cone_ranges((*POSE[:2], 0.0), behind, sensors("three"), CONTROL_POINT_M)
     assert np.all(np.isinf(found))
 
@@ -89,7 +89,7 @@ def test_a_scan_of_seven_is_a_half_plane_of_rays():
     scan = sensors("scan_7")
     assert scan.axes_deg == tuple(90.0 - 30.0 * k for k in range(7))
     assert scan.places == ((0.0, 0.0),) * 7
-    wall = np.array([[0.175 + 1.05, 0.0, 0.0, 0.1, 9.0]])
+    wall = np.array([[0.175 + 1.05, 0.0, 0.0, 0.1, 9.0, 0.0]])
     found = cone_ranges((0.0, 0.0, 0.0), wall, scan, CONTROL_POINT_M)
     assert np.all(np.isinf(found[[0, 6]]))
     for axis, range_ in zip(scan.axes_deg[1:6], found[1:6], strict=True):
@@ -97,7 +97,7 @@ def test_a_scan_of_seven_is_a_half_plane_of_rays():
         assert range_ == pytest.approx(1.0 / math.cos(nearest), rel=1e-9)
     # Between two beams a post of 2 cm is not seen.
     angle = math.radians(15.0)
-    post = [0.175 + math.cos(angle), math.sin(angle), 0.0, 0.02, 0.02]
+    post = [0.175 + math.cos(angle), math.sin(angle), 0.0, 0.02, 0.02, 0.0]
     found = cone_ranges((0.0, 0.0, 0.0), np.array([post]), scan, CONTROL_POINT_M)
     assert np.all(np.isinf(found))
 

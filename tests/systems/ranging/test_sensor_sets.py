@@ -57,10 +57,10 @@ def test_a_thin_ring_measures_a_round_of_walls():
     """36 beams of a degree from the middle of a room of 4 m: closed form."""
     walls = np.array(
         [
-            [2.5, 0.0, 0.0, 1.0, 8.0],
-            [-2.5, 0.0, 0.0, 1.0, 8.0],
-            [0.0, 2.5, 0.0, 8.0, 1.0],
-            [0.0, -2.5, 0.0, 8.0, 1.0],
+            [2.5, 0.0, 0.0, 1.0, 8.0, 0.0],
+            [-2.5, 0.0, 0.0, 1.0, 8.0, 0.0],
+            [0.0, 2.5, 0.0, 8.0, 1.0, 0.0],
+            [0.0, -2.5, 0.0, 8.0, 1.0, 0.0],
         ]
     )
     lidar = sensors(sensors=36, beam_half_angle_deg=0.5)

@@ -26,15 +26,21 @@ ARENA = (-2.0, -1.5, 2.0, 1.5)
 def test_cells_near_rectangles_are_blocked_and_no_others():
     generator = np.random.default_rng(3)
     boxes = np.column_stack(
-        [generator.uniform(-2.2, 2.2, (6, 3)), generator.uniform(0.05, 1.0, (6, 2))]
+        [
+            generator.uniform(-2.2, 2.2, (6, 3)),
+            generator.uniform(0.05, 1.0, (6, 2)),
+            [0.0, 0.0, 0.0, 0.1, 0.2, 0.3],
+        ]
     )
+    boxes[4:, 4] = 0.0  # walls with round ends
+    boxes[5, 3] = 0.0  # a disc
     grid = make_occupancy_grid(ARENA)
     block_rectangles(grid, boxes, RADIUS)
     assert grid.blocked.shape == (80, 60)
     for i in range(80):
         for j in range(60):
             # Two rectangles' distance, one of no extent.
-            speck = np.array([-1.975 + 0.05 * i, -1.475 + 0.05 * j, 0.0, 0.0, 0.0])
+            speck = np.array([-1.975 + 0.05 * i, -1.475 + 0.05 * j, 0.0, 0.0, 0.0, 0.0])
             off = min(rectangle_clearance(speck, box) for box in boxes)
             assert grid.blocked[i, j] == (off < RADIUS), (i, j, off)
 
@@ -63,7 +69,7 @@ def test_cells_and_their_middles():
 
 def test_the_grid_of_a_map_holds_points_and_corners():
     """A square of 1 m turned by 45 deg reaches sqrt(1/2) from its middle."""
-    box = np.array([[2.0, 3.0, math.pi / 4.0, 1.0, 1.0]])
+    box = np.array([[2.0, 3.0, math.pi / 4.0, 1.0, 1.0, 0.0]])
     grid = map_grid([(0, 0), (5, -1)], box, RADIUS)
     assert grid.low == pytest.approx((-ARENA_MARGIN_M, -1.0 - ARENA_MARGIN_M))
     top = 3.0 + math.sqrt(0.5) + ARENA_MARGIN_M

@@ -14,8 +14,8 @@ from systems.routes.route import ROUTE_POINTS, ROUTE_SIZE, plan_route
 from systems.world.geometry import rectangle_corners
 
 CLEARANCE = 0.35
-ROOM = [[-5.0, 0, 0, 0.1, 10.2], [5, 0, 0, 0.1, 10.2]]
-ROOM += [[0, -5.0, 0, 10.2, 0.1], [0, 5, 0, 10.2, 0.1]]
+ROOM = [[-5.0, 0, 0, 0.1, 10.2, 0], [5, 0, 0, 0.1, 10.2, 0]]
+ROOM += [[0, -5.0, 0, 10.2, 0.1, 0], [0, 5, 0, 10.2, 0.1, 0]]
 
 
 def sampled_clearance(points, rectangles):
@@ -39,7 +39,7 @@ def random_room(seed):
     """Boxes in a room 10 m wide; start and goal keep the clearance."""
     generator = np.random.default_rng(seed)
     boxes = [
-        [*generator.uniform(-4.5, 4.5, 2), generator.uniform(0, 3.2), *sides]
+        [*generator.uniform(-4.5, 4.5, 2), generator.uniform(0, 3.2), *sides, 0]
         for sides in generator.uniform(0.2, 1.6, (generator.integers(4, 16), 2))
     ]
     boxes += ROOM
@@ -51,7 +51,7 @@ def random_room(seed):
                 abs(math.cos(t) * (point[0] - x) + math.sin(t) * (point[1] - y)) < a / 2
                 and abs(math.cos(t) * (point[1] - y) - math.sin(t) * (point[0] - x))
                 < b / 2
-                for x, y, t, a, b in boxes
+                for x, y, t, a, b, _ in boxes
             ]
             if not any(inside) and sampled_clearance([point, point], boxes) > CLEARANCE:
                 return tuple(point.tolist())
@@ -97,7 +97,7 @@ def test_routes_keep_92_percent_of_any_clearance(clearance):
     for _ in range(60):
         sides = generator.uniform(0.1 * size, 0.4 * size, (8, 2))
         boxes = [
-            [*generator.uniform(-size, size, 2), generator.uniform(0, 3.2), *side]
+            [*generator.uniform(-size, size, 2), generator.uniform(0, 3.2), *side, 0]
             for side in sides
         ]
         ends = generator.uniform(-size, size, (2, 2))
@@ -118,7 +118,7 @@ def test_no_route_begins_with_a_way_through_a_thin_wall():
 
     The other obstacle shifts the cells.
     """
-    wall = [[0.0, 0.0, 0.0, 2.0, 0.001], [0.0, -0.985, 0.0, 0.01, 0.01]]
+    wall = [[0, 0, 0, 2.0, 0.001, 0], [0, -0.985, 0, 0.01, 0.01, 0]]
     route = plan_route((0.0, 0.0055), (0.0, 1.0), wall)
     assert route.points[:, 1].min() > 0.0025
 
@@ -142,7 +142,7 @@ def test_a_short_route_has_points_every_cm():
 
 def test_round_a_post_it_is_tangents_and_an_arc():
     """2 sqrt(4 - r^2) + 2 r asin(r/2): two tangents and the arc between them."""
-    post = [[0.0, 0.0, 0.4, 1e-3, 1e-3]]
+    post = [[0.0, 0.0, 0.0, 0.0, 0.0, 5e-4]]
     route = plan_route((-2.0, 0.0), (2.0, 0.0), post)
     tangents = 2.0 * math.sqrt(4.0 - CLEARANCE**2)
     expected = tangents + 2.0 * CLEARANCE * math.asin(CLEARANCE / 2.0)
@@ -150,7 +150,7 @@ def test_round_a_post_it_is_tangents_and_an_arc():
 
 
 def test_a_start_near_a_wall_is_left_straight_away_from_it():
-    wall = [[0.0, 0.0, 0.0, 2.0, 0.1]]
+    wall = [[0.0, 0.0, 0.0, 2.0, 0.1, 0.0]]
     route = plan_route((0.0, 0.15), (0.3, -2.0), wall)
     off = np.abs(route.points[:, 1]) - 0.05
     assert off[0] == pytest.approx(0.1)
@@ -162,7 +162,7 @@ def test_a_start_near_a_wall_is_left_straight_away_from_it():
 
 def test_where_rounding_would_cut_a_corner_it_is_less():
     """Round the end of a thin wall whole windows lose 27 mm."""
-    wall = [[0.0, 0.0, 0.0, 4.0, 0.01]]
+    wall = [[0.0, 0.0, 0.0, 4.0, 0.01, 0.0]]
     route = plan_route((1.0, 0.3), (1.0, -0.3), wall, clearance_m=0.16)
     assert route.points[:, 0].max() > 2.0
     assert sampled_clearance(route.points, wall) >= 0.16 - 0.02
@@ -171,10 +171,20 @@ def test_where_rounding_would_cut_a_corner_it_is_less():
 @pytest.mark.parametrize(
     ("start", "goal", "boxes", "message"),
     [
-        ((0, 0), (2, 0), [[2, 0.2, 0, 0.6, 0.6]], r"goal_m: \(2, 0\) lies in a known"),
-        ((0, 0), (2, 0), [[2, 0.6, 0, 0.6, 0.6]], "goal_m: .* 0.3 m from .* 0.35"),
-        ((0, 0), (2, 0), [[0, 0.2, 0, 0.6, 0.6]], r"start: P starts at \(0, 0\), in"),
-        ((0, 0), (2, 0), [[0, 0, 0.1, 0, 0]], "start"),
+        (
+            (0, 0),
+            (2, 0),
+            [[2, 0.2, 0, 0.6, 0.6, 0]],
+            r"goal_m: \(2, 0\) lies in a known",
+        ),
+        ((0, 0), (2, 0), [[2, 0.6, 0, 0.6, 0.6, 0]], "goal_m: .* 0.3 m from .* 0.35"),
+        (
+            (0, 0),
+            (2, 0),
+            [[0, 0.2, 0, 0.6, 0.6, 0]],
+            r"start: P starts at \(0, 0\), in",
+        ),
+        ((0, 0), (2, 0), [[0, 0, 0.1, 0, 0, 0]], "start"),
         ((1, 1), (1, 1), [], "goal_m: .* where P starts"),
         ((0, 0), (9, 0), ROOM, r"no route leads from \(0, 0\) to \(9, 0\) at 0.35 m"),
     ],

@@ -15,7 +15,7 @@ from systems.routes.seen_points import (
 
 ARENA = (-3.0, -3.0, 3.0, 3.0)
 P = (0.5, -0.5)
-NOTHING = np.empty((0, 5))
+NOTHING = np.empty((0, 6))
 
 
 def slots(*objects):
@@ -56,7 +56,7 @@ def test_what_is_not_remembered(slot):
 
 
 def test_what_the_map_has_is_not_remembered():
-    box = np.array([[1.3, -0.5, 0.0, 0.4, 0.4]])
+    box = np.array([[1.3, -0.5, 0.0, 0.4, 0.4, 0.0]])
     at_box, beside = (1, 0.6, 0.0, 0, 0, 1, 0, 0), (1, 0.5, 0.3, 0, 0, 1, 0, 0)
     found = remembered(at_box, beside, rectangles=box)
     assert found == pytest.approx(np.array([[1.0, -0.2]]))

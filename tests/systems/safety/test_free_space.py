@@ -24,7 +24,7 @@ from systems.safety.free_space import (
     see,
 )
 from systems.safety.views import PlaceError, lasting, place_error, sensor_sectors
-from systems.world.geometry import fan_ranges
+from systems.world.cones import fan_ranges
 
 CONTROL_POINT_M = 0.175
 CELL_M = 0.05
@@ -98,7 +98,7 @@ def is_seen(
     before = ranges_of(sensors, pose, boxes)
     seen = np.zeros((len(points), sensors.count), dtype=bool)
     for k, (x, y) in enumerate(points):
-        box = np.vstack([boxes, [x, y, 0.0, 1e-7, 1e-7]])
+        box = np.vstack([boxes, [x, y, 0.0, 1e-7, 1e-7, 0.0]])
         seen[k] = ranges_of(sensors, pose, box) < before + 1e-6
         seen[k] &= ranges_of(sensors, pose, box[-1:]) < before + 1e-6
         seen[k] &= ranges_of(sensors, pose, box[-1:]) < sensors.maximum_range_m
@@ -117,6 +117,7 @@ def scene(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             draw.uniform(0, math.pi, 8),
             draw.uniform(0.02, 0.6, 8),
             draw.uniform(0.02, 0.3, 8),
+            np.zeros(8),
         ]
     )
     return pose, boxes
@@ -175,7 +176,7 @@ def ring_of(count: int, half_angle_deg: float) -> set[tuple[int, int]]:
         {"sensors": count, "beam_half_angle_deg": half_angle_deg}
     )
     return free_cells(
-        seen_space(sensors, np.array([0.013, 0.02, 0.3]), np.empty((0, 5)))
+        seen_space(sensors, np.array([0.013, 0.02, 0.3]), np.empty((0, 6)))
     )
 
 

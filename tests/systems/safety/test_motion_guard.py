@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from diagrams import Scenario, load_scenario, simulate
+from phonotaxis.testing import Bench
 from systems import FreeSpaceMap, MotionGuard, WheelCommand
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
@@ -68,55 +69,51 @@ def known_space(radius: float = 3.0) -> Any:
     return space
 
 
-def guarded(
-    bench: Any, space: Any, acceleration: Any, fault: float = 0.0, **fields: Any
-) -> Any:
+def guarded(space: Any, acceleration: Any, fault: float = 0.0, **fields: Any) -> Any:
     """The guard's state after a tick: v_P, wheels, report, modeled wheels."""
-    from pydrake.common.value import Value
-
     guard = MotionGuard(parameters=GuardParameters(**fields))
-    made = bench(
+    made = Bench(
         guard,
         acceleration_W=acceleration,
         pose_WB_estimated=[0, 0, 0.3],
         sensing_fault=[fault, 0.0],
+        free_space=space,
     )
-    guard.GetInputPort("free_space").FixValue(made.context, Value[object](space))
-    return made.updated()
+    return made.next_state()
 
 
 @pytest.mark.parametrize("acceleration", [(4.0, 1.0), (-3.0, 9.0), (80.0, -60.0)])
-def test_in_known_space_it_is_the_block_in_whose_place_it_stands(bench, acceleration):
-    plain = bench(
+def test_in_known_space_it_is_the_block_in_whose_place_it_stands(acceleration):
+    plain = Bench(
         WheelCommand(), acceleration_W=acceleration, pose_WB_estimated=[0, 0, 0.3]
-    ).updated()
-    state = guarded(bench, known_space(), acceleration)
+    ).next_state()
+    state = guarded(known_space(), acceleration)
     np.testing.assert_array_equal(state[:4], plain)
     assert state[4] == 0.0
     # The wheels follow with the lag: 1 - 1/sqrt(e) after half of it.
     np.testing.assert_allclose(state[8:], plain[2:] * (1.0 - math.exp(-0.5)))
 
 
-def test_what_it_reports(bench):
+def test_what_it_reports():
     """Rest at an edge that is 0.8 m away: 8 mm of cells that are only partly free."""
-    state = guarded(bench, known_space(0.8), (0.0, 0.0))
+    state = guarded(known_space(0.8), (0.0, 0.0))
     assert state[4] == 0.0
     needed = body_radius(Scenario().only.robot) + 0.012
     assert 0.8 - 0.05 * math.sqrt(2.0) <= state[5] + needed <= 0.8
     assert state[6] == 0.0
     # At 0.4 m/s of the faster wheel it stops within v^2/2a + v (lag + tick).
-    state = guarded(bench, known_space(), (16.0 * math.cos(0.3), 16.0 * math.sin(0.3)))
+    state = guarded(known_space(), (16.0 * math.cos(0.3), 16.0 * math.sin(0.3)))
     assert state[6] == pytest.approx(0.4**2 / 3.0 + 0.4 * 0.075)
 
 
-def test_what_is_wrong_with_the_sensing_halts_it(bench):
-    state = guarded(bench, known_space(), (4.0, 1.0), fault=2.0)
+def test_what_is_wrong_with_the_sensing_halts_it():
+    state = guarded(known_space(), (4.0, 1.0), fault=2.0)
     np.testing.assert_array_equal(state[:5], [0.0, 0.0, 0.0, 0.0, HALTED])
 
 
-def test_what_it_changes_the_virtual_mass_moves_by(bench):
+def test_what_it_changes_the_virtual_mass_moves_by():
     """v_P is that of the wheels: else it would wind up against the guard."""
-    state = guarded(bench, known_space(0.55), (20.0, 0.0))
+    state = guarded(known_space(0.55), (20.0, 0.0))
     assert state[4] > 0.0
     v = 0.06 * (state[2] + state[3]) / 2.0
     omega = 0.06 * (state[3] - state[2]) / 0.41

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 import scipy.signal
 import soundfile
-from pydrake.common.value import Value
 
+from phonotaxis.testing import evaluate
 from systems.framework.signals import FRAME_SAMPLES, TICK_S
 from systems.sound.ego_noise import EgoNoise
 from systems.sound.mic_array import MicArray
@@ -97,13 +95,11 @@ def counts_at(block, tick):
     time = tick * TICK_S
     p_WS, v_WS = np.tile([2.0, 0.0], (6, 1)), np.zeros((6, 2))
     sent = make_emission(time, make_waveform(SILENT), SILENT, p_WS, v_WS)
-    context = block.CreateDefaultContext()
-    context.SetTime(time)
-    block.GetInputPort("emission").FixValue(context, Value(sent))
-    block.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
-    block.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
-    audio: Any = block.GetOutputPort("audio").Eval(context)
-    return audio.counts
+    rest = [0.0] * 3
+    outputs = evaluate(
+        block, time_s=time, emission=sent, pose_WB=rest, velocity_WB=rest
+    )
+    return outputs["audio"].counts
 
 
 def test_microphones_hear_it_beside_the_converters_noise(tmp_path):

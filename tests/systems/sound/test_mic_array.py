@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from pydrake.common.value import Value
 
+from phonotaxis.testing import Bench, evaluate
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.faults import Fault
 from systems.framework.input_error import InputError
@@ -50,13 +49,14 @@ def emission(source, *, sounding=True, level_pa=0.1, velocity=(0.0, 0.0), time=T
 def recorded(
     sent, pose=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), *, time=TIME, **block
 ):
-    array = MicArray(**block)
-    context = array.CreateDefaultContext()
-    context.SetTime(time)
-    array.GetInputPort("emission").FixValue(context, Value(sent))
-    array.GetInputPort("pose_WB").FixValue(context, np.array(pose))
-    array.GetInputPort("velocity_WB").FixValue(context, np.array(velocity))
-    return array.GetOutputPort("audio").Eval(context)
+    outputs = evaluate(
+        MicArray(**block),
+        time_s=time,
+        emission=sent,
+        pose_WB=pose,
+        velocity_WB=velocity,
+    )
+    return outputs["audio"]
 
 
 def phase_and_amplitude(counts, time=TIME):
@@ -126,14 +126,16 @@ def test_warmer_air_is_faster():
 
 def with_errors(array, sent, errors):
     """Frame of a context whose numeric parameters are set, by their numbers."""
-    context = array.CreateDefaultContext()
-    context.SetTime(TIME)
-    array.GetInputPort("emission").FixValue(context, Value(sent))
-    array.GetInputPort("pose_WB").FixValue(context, [1.0, -0.5, 0.4])
-    array.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
+    at = Bench(
+        array,
+        time_s=TIME,
+        emission=sent,
+        pose_WB=[1.0, -0.5, 0.4],
+        velocity_WB=[0.0] * 3,
+    )
     for index, values in errors.items():
-        context.get_mutable_numeric_parameter(index).SetFromVector(values)
-    return array.GetOutputPort("audio").Eval(context).counts
+        at.context.get_mutable_numeric_parameter(index).SetFromVector(values)
+    return at.output("audio").counts
 
 
 def test_errors_of_a_context_shift_what_its_microphones_hear():
@@ -206,18 +208,16 @@ def test_frame_starts_from_the_pose_of_the_last_tick():
     With no velocity at either end it goes by 3 s^2 - 2 s^3: half the way in
     the middle of the frame.
     """
-    array = MicArray(parameters=quiet())
-    context = array.CreateDefaultContext()
-    array.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
-    array.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
-    sent = emission((3.0, 0.0))
-    array.GetInputPort("emission").FixValue(context, Value(sent))
-    context.SetTime(TIME - 0.025)
-    updates = array.EvalUniquePeriodicDiscreteUpdate(context).Clone()
-    context.SetDiscreteState(updates)
-    context.SetTime(TIME)
-    array.GetInputPort("pose_WB").FixValue(context, [0.003, 0.0, 0.0])
-    audio = array.GetOutputPort("audio").Eval(context)
+    at = Bench(
+        MicArray(parameters=quiet()),
+        time_s=TIME - 0.025,
+        emission=emission((3.0, 0.0)),
+        pose_WB=[0.0] * 3,
+        velocity_WB=[0.0] * 3,
+    )
+    at.state = at.next_state()
+    at.context.SetTime(TIME)
+    audio = at.set(pose_WB=[0.003, 0.0, 0.0]).output("audio")
     assert isinstance(audio, AudioFrame)
     counts = audio.counts[1]
     s = np.arange(2500) / 2500
@@ -231,16 +231,16 @@ def test_frame_starts_from_the_pose_of_the_last_tick():
 
 def test_a_pose_of_an_older_tick_is_no_start_of_a_frame():
     """The robot stood elsewhere two ticks ago, and has rested for this frame."""
-    array = MicArray(parameters=quiet())
-    context = array.CreateDefaultContext()
-    array.GetInputPort("emission").FixValue(context, Value(emission((3.0, 0.0))))
-    array.GetInputPort("pose_WB").FixValue(context, [-0.05, 0.0, 0.0])
-    array.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
-    context.SetTime(TIME - 0.05)
-    context.SetDiscreteState(array.EvalUniquePeriodicDiscreteUpdate(context).Clone())
-    context.SetTime(TIME)
-    array.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
-    audio: Any = array.GetOutputPort("audio").Eval(context)
+    at = Bench(
+        MicArray(parameters=quiet()),
+        time_s=TIME - 0.05,
+        emission=emission((3.0, 0.0)),
+        pose_WB=[-0.05, 0.0, 0.0],
+        velocity_WB=[0.0] * 3,
+    )
+    at.state = at.next_state()
+    at.context.SetTime(TIME)
+    audio = at.set(pose_WB=[0.0] * 3).output("audio")
     phases, _ = phase_and_amplitude(audio.counts)
     expected = np.exp(-2j * np.pi * TONE * (3.0 - 0.175) / 340.0)
     np.testing.assert_allclose(np.exp(1j * phases[1]), expected, atol=1e-3)
@@ -253,14 +253,15 @@ def test_sources_add_up():
     sent = emission((2.0, 0.5)), emission((1.0, -2.0))
     heard = []
     for first, second in ((sent[0], sent[1]), (sent[0], silent), (silent, sent[1])):
-        context = array.CreateDefaultContext()
-        context.SetTime(TIME)
-        array.GetInputPort("emission").FixValue(context, Value(first))
-        array.GetInputPort("emission_fan").FixValue(context, Value(second))
-        array.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
-        array.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
-        audio: Any = array.GetOutputPort("audio").Eval(context)
-        heard.append(audio.counts.astype(float))
+        outputs = evaluate(
+            array,
+            time_s=TIME,
+            emission=first,
+            emission_fan=second,
+            pose_WB=[0.0] * 3,
+            velocity_WB=[0.0] * 3,
+        )
+        heard.append(outputs["audio"].counts.astype(float))
     # Each frame is rounded and holds the same noise, below one count.
     np.testing.assert_allclose(heard[0], heard[1] + heard[2], atol=3.0)
     assert np.std(heard[2]) > 100.0

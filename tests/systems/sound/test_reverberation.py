@@ -9,8 +9,8 @@ import pyroomacoustics as pra
 import pytest
 import scipy.interpolate
 import scipy.signal
-from pydrake.common.value import Value
 
+from phonotaxis.testing import evaluate
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.signals import FRAME_SAMPLES, TICK_S, Emission
 from systems.sound import reverberation
@@ -70,13 +70,14 @@ def test_resting_array_records_what_pyroomacoustics_simulates():
     source, pose = np.array([1.6, 0.9]), np.array([-0.8, -0.3, 0.4])
     parameters = MicArrayParameters(snr_db_at_1m=150.0, adc_bits=16)
     block = MicArray(parameters=parameters, room=room)
-    context = block.CreateDefaultContext()
-    context.SetTime(TIME)
-    block.GetInputPort("emission").FixValue(context, Value(emission(source)))
-    block.GetInputPort("pose_WB").FixValue(context, pose)
-    block.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
-    audio: Any = block.GetOutputPort("audio").Eval(context)
-    pressure = audio.counts / parameters.counts_per_pa
+    outputs = evaluate(
+        block,
+        time_s=TIME,
+        emission=emission(source),
+        pose_WB=pose,
+        velocity_WB=[0.0] * 3,
+    )
+    pressure = outputs["audio"].counts / parameters.counts_per_pa
 
     absorption, _, order = room.walls(C)
     box = pra.ShoeBox(

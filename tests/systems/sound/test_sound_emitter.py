@@ -9,6 +9,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from phonotaxis.testing import run
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.source_robot import SourceRobot
 from systems.framework.block import RunFacts
@@ -129,19 +130,16 @@ def test_called_on_it_plays_from_that_tick_as_one_that_starts_then():
     late = SoundParameters(on_s=0.2, period_s=0.4, start_s=0.1)
     emissions: dict[str, Any] = {}
     for name, own, called in (("called", sound, True), ("clock", late, False)):
-        block = SoundEmitter(sound=own, called=called)
-        context = block.CreateDefaultContext()
-        for port in ("pose_WS", "v_WS"):
-            block.GetInputPort(port).FixValue(context, [0.0] * 3)
-        simulator = Simulator(block, context)
-        if called:
-            block.GetInputPort("calling").FixValue(context, [0.0])
-            simulator.AdvanceTo(0.09)
-            quiet: Any = block.GetOutputPort("emission").Eval(context)
-            assert not quiet.sounding
-            block.GetInputPort("calling").FixValue(context, [1.0])
-        simulator.AdvanceTo(0.28)
-        emissions[name] = block.GetOutputPort("emission").Eval(context)
+        calls: dict[str, Any] = {"calling": lambda t: float(t > 0.09)}
+        history = run(
+            SoundEmitter(sound=own, called=called),
+            0.275,
+            pose_WS=[0.0] * 3,
+            v_WS=[0.0] * 3,
+            **(calls if called else {}),
+        )
+        assert not called or not history["emission"][3].sounding
+        emissions[name] = history["emission"][-1]
     assert np.any(emissions["clock"].samples)
     assert np.array_equal(emissions["called"].samples, emissions["clock"].samples)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from systems.framework.input_error import LONGEST_MESSAGE
+from systems.framework.input_error import LONGEST_MESSAGE, InputError
 from systems.sound.sound_file import read_recording, read_sound
 
 TWO = np.stack([np.linspace(-0.5, 0.5, 400), np.linspace(0.25, 0.0, 400)])
@@ -268,3 +268,15 @@ def test_chunks_of_odd_length_are_followed_by_a_byte(tmp_path, size):
     )  # fmt: skip
     samples, _ = read_sound(tmp_path / "b.wav", "sound.file")
     np.testing.assert_allclose(samples, TWO, atol=1e-4)
+
+
+def test_samples_beyond_single_precision_are_refused(tmp_path):
+    """Their powers would be infinite; unscaled 32-bit numbers are not so large."""
+    path = tmp_path / "large.wav"
+    samples = np.sin(np.arange(4_000.0))
+    soundfile.write(path, 2.0**31 * samples, 48_000, subtype="DOUBLE")
+    assert np.abs(read_sound(path, "file")[0]).max() > 2e9
+    for most in (1e13, 1e300):
+        soundfile.write(path, most * samples, 48_000, subtype="DOUBLE")
+        with pytest.raises(InputError, match=r"samples up to 1\.0e\+.* 16 or 24 bits"):
+            read_sound(path, "file")

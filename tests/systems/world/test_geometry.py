@@ -10,13 +10,12 @@ from hypothesis import assume, given, strategies as st
 from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
 
+from systems.world.cones import cone_range
+from systems.world.contacts import contact_time, first_overlap
 from systems.world.geometry import (
     beyond_rectangle,
-    cone_range,
-    contact_time,
     control_point,
     control_point_velocity,
-    first_overlap,
     nearest_point_on_rectangle,
     rectangle_clearance,
     rectangle_corners,
@@ -29,29 +28,47 @@ SPACING = 0.01
 place = st.floats(-3.0, 3.0)
 angle = st.floats(-math.pi, math.pi)
 extent = st.floats(0.02, 2.0)
-rectangles = st.tuples(place, place, angle, extent, extent)
+radius = st.floats(0.02, 0.5)
+zero = st.just(0.0)
+boxes = st.tuples(place, place, angle, extent, extent, zero)
+#: Boxes, line segments, discs, walls with round ends, and boxes with round corners.
+rectangles = st.one_of(
+    boxes,
+    st.tuples(place, place, angle, extent, zero, zero),
+    st.tuples(place, place, angle, zero, extent, zero),
+    st.tuples(place, place, angle, zero, zero, radius),
+    st.tuples(place, place, angle, extent, zero, radius),
+    st.tuples(place, place, angle, zero, extent, radius),
+    st.tuples(place, place, angle, extent, extent, radius),
+)
 
 
 def edges(rectangle, spacing: float = SPACING) -> NDArray[np.float64]:
     """Points of the outline, at most ``spacing`` apart."""
-    x, y, theta, length, width = rectangle
+    x, y, theta, length, width, r = rectangle
     u = np.linspace(-length / 2, length / 2, math.ceil(length / spacing) + 1)
     v = np.linspace(-width / 2, width / 2, math.ceil(width / spacing) + 1)
-    sides = [np.array([u, np.full_like(u, side)]) for side in (-width / 2, width / 2)]
-    sides += [
-        np.array([np.full_like(v, side), v]) for side in (-length / 2, length / 2)
-    ]
+    ends = (-1.0, 1.0)
+    sides = [np.array([u, np.full_like(u, e * (width / 2 + r))]) for e in ends]
+    sides += [np.array([np.full_like(v, e * (length / 2 + r)), v]) for e in ends]
+    turn = np.linspace(0.0, math.pi / 2, math.ceil(2.0 * r / spacing) + 1)
+    arc = r * np.array([np.cos(turn), np.sin(turn)])
+    corner = np.array([[length / 2], [width / 2]])
+    sides += [np.array([[a], [b]]) * (corner + arc) for a in ends for b in ends]
     u, v = np.concatenate(sides, axis=1)
     c, s = math.cos(theta), math.sin(theta)
     return np.column_stack([x + c * u - s * v, y + s * u + c * v])
 
 
 def contains(rectangle, points) -> NDArray[np.bool_]:
-    x, y, theta, length, width = rectangle
+    """Whether points are inside; nothing is inside a line."""
+    x, y, theta, length, width, r = rectangle
     c, s = math.cos(theta), math.sin(theta)
     d = np.asarray(points) - [x, y]
     u, v = c * d[..., 0] + s * d[..., 1], -s * d[..., 0] + c * d[..., 1]
-    return (np.abs(u) < length / 2) & (np.abs(v) < width / 2)
+    u, v = np.abs(u) - length / 2, np.abs(v) - width / 2
+    beside = (u < 0.0) & (v < 0.0)
+    return beside | (np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0)) < r)
 
 
 def moved(rectangle, turn: float, shift) -> tuple[float, ...]:
@@ -107,7 +124,7 @@ def test_safe_norm_has_a_gradient_at_zero():
 
 
 def test_corners_run_counter_clockwise_from_front_left():
-    corners = rectangle_corners([1.0, 1.0, math.pi / 2, 2.0, 1.0])
+    corners = rectangle_corners([1.0, 1.0, math.pi / 2, 2.0, 1.0, 0.0])
     expected = [[0.5, 2.0], [0.5, 0.0], [1.5, 0.0], [1.5, 2.0]]
     np.testing.assert_allclose(corners, expected, atol=1e-15)
 
@@ -119,11 +136,13 @@ def test_nearest_point_of_a_rectangle(point, rectangle):
     if contains(rectangle, point):
         assert distance == 0.0
         return
-    grown = (*rectangle[:3], rectangle[3] + 1e-9, rectangle[4] + 1e-9)
+    grown = (*rectangle[:3], *np.add(rectangle[3:], 1e-9))
     assert contains(grown, np.add(point, vector))
     sampled = np.min(np.linalg.norm(edges(rectangle) - point, axis=1))
     assert distance <= sampled + 1e-9
-    assert sampled <= math.hypot(distance, SPACING) + 1e-9
+    # Between two samples, a round corner bulges.
+    bulge = 0.5 * SPACING if rectangle[5] else 1e-9
+    assert sampled <= math.hypot(distance, SPACING) + bulge
 
 
 @given(st.lists(st.tuples(place, place), min_size=1), rectangles)
@@ -189,7 +208,7 @@ def test_cone_range_does_not_depend_on_the_frame(x, y, axis, body, turn, shift):
 
 def test_cone_sees_a_wall_beside_its_axis():
     """A wall 1 m ahead, axis 30 deg aside: the cone's border at 15 deg is nearest."""
-    wall = (1.5, 0.0, 0.0, 1.0, 20.0)
+    wall = (1.5, 0.0, 0.0, 1.0, 20.0, 0.0)
     half_angle = math.radians(15)
     expected = 1.0 / math.cos(math.radians(15))
     for axis_deg in (30, -30):
@@ -199,9 +218,9 @@ def test_cone_sees_a_wall_beside_its_axis():
 
 
 def test_cone_does_not_see_behind_or_beside():
-    box = (-1.0, 0.0, 0.0, 0.1, 0.1)
+    box = (-1.0, 0.0, 0.0, 0.1, 0.1, 0.0)
     assert seen(0.0, 0.0, 0.0, math.radians(15), [box]) == math.inf
-    beside = (1.0, 1.0, 0.0, 0.1, 0.1)
+    beside = (1.0, 1.0, 0.0, 0.1, 0.1, 0.0)
     assert seen(0.0, 0.0, 0.0, math.radians(15), [beside]) == math.inf
 
 
@@ -230,15 +249,21 @@ def test_clearance_against_sampled_edges(a, b):
         assert sampled <= exact + 0.02
 
 
-@given(rectangles, angle, extent, extent, st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
-def test_overlap_is_undone_by_its_depth(a, heading, length, width, u, v):
+@given(
+    st.tuples(place, place, angle, extent, extent, st.one_of(zero, radius)),
+    angle,
+    st.tuples(extent, extent, st.one_of(zero, radius)),
+    st.floats(-0.4, 0.4),
+    st.floats(-0.4, 0.4),
+)
+def test_overlap_is_undone_by_its_depth(a, heading, size, u, v):
     """The shortest push along an edge's normal, found by trying all of them.
 
     The second center lies inside the first rectangle, so that they overlap.
     """
     c, s = math.cos(a[2]), math.sin(a[2])
     x, y = a[0] + c * u * a[3] - s * v * a[4], a[1] + s * u * a[3] + c * v * a[4]
-    b = (x, y, heading, length, width)
+    b = (x, y, heading, *size)
     depth = -clearance(a, b)
     assert depth > 0.0
     normals = [body[2] + k * math.pi / 2 for body in (a, b) for k in range(4)]
@@ -252,14 +277,17 @@ def test_overlap_is_undone_by_its_depth(a, heading, length, width, u, v):
 @pytest.mark.parametrize(
     ("b", "expected"),
     [
-        ((3.0, 0.0, 0.0, 2.0, 1.0), 1.0),
-        ((1.9, 0.0, 0.0, 2.0, 1.0), -0.1),
-        ((5.0, 4.5, 0.0, 2.0, 1.0), math.hypot(3.0, 3.5)),
-        ((3.0, 0.0, math.pi / 4, 2.0, 2.0), 2.0 - math.sqrt(2)),
+        ((3.0, 0.0, 0.0, 2.0, 1.0, 0.0), 1.0),
+        ((1.9, 0.0, 0.0, 2.0, 1.0, 0.0), -0.1),
+        ((5.0, 4.5, 0.0, 2.0, 1.0, 0.0), math.hypot(3.0, 3.5)),
+        ((3.0, 0.0, math.pi / 4, 2.0, 2.0, 0.0), 2.0 - math.sqrt(2)),
+        ((5.0, 4.5, 1.0, 0.0, 0.0, 0.5), math.hypot(4.0, 4.0) - 0.5),
+        ((2.0, 0.0, 0.5 * math.pi, 3.0, 0.0, 0.4), 0.6),
+        ((1.2, 0.0, 0.0, 0.0, 0.0, 0.4), -0.2),
     ],
 )
 def test_clearance_in_closed_form(b, expected):
-    assert clearance((0.0, 0.0, 0.0, 2.0, 1.0), b) == pytest.approx(expected)
+    assert clearance((0.0, 0.0, 0.0, 2.0, 1.0, 0.0), b) == pytest.approx(expected)
 
 
 def approach(a, b, velocity, time) -> float:
@@ -281,7 +309,7 @@ def test_contact_time_is_when_the_clearance_vanishes(a, b, vx, vy):
 
 def test_contact_time_in_numbers():
     """Faces 3 m apart at 0.5 m/s; 45 deg later the corner comes first."""
-    a, b = np.array([0, 0, 0, 1.0, 1.0]), np.array([4.0, 0, 0, 1.0, 1.0])
+    a, b = np.array([0, 0, 0, 1.0, 1.0, 0]), np.array([4.0, 0, 0, 1.0, 1.0, 0])
     assert contact_time(a, b, 0.5, 0.0) == pytest.approx(6.0)
     assert math.isinf(contact_time(a, b, -0.5, 0.0))
     assert math.isinf(contact_time(a, b, 0.0, 0.0))
@@ -290,8 +318,31 @@ def test_contact_time_in_numbers():
     assert contact_time(b, b, 0.5, 0.0) == 0.0
 
 
+def test_contact_time_with_a_disc_in_numbers():
+    """A disc of 0.3 m passes a box at an offset of 0.7 m, and touches its corner."""
+    a, b = np.array([0, 0.7, 1.0, 0, 0, 0.3]), np.array([4.0, 0, 0, 1.0, 1.0, 0])
+    ahead = 3.5 - math.sqrt(0.3**2 - 0.2**2)
+    assert contact_time(a, b, 0.5, 0.0) == pytest.approx(ahead / 0.5)
+    a[1] = 0.8 + 1e-9
+    assert math.isinf(contact_time(a, b, 0.5, 0.0))
+
+
+def test_cone_range_of_a_disc_in_closed_form():
+    """Law of cosines along the side of the cone that is nearer to the center."""
+    half_angle, far, r = math.radians(10), 2.0, 0.4
+    for off_deg in (0.0, 9.0, -18.0, 21.0, 21.6):
+        beside = max(math.radians(abs(off_deg) - 10), 0.0)
+        roots = np.roots([1.0, -2.0 * far * math.cos(beside), far**2 - r**2])
+        expected = min(roots.real) if np.isreal(roots).all() else math.inf
+        off = math.radians(off_deg)
+        disc = (far * math.cos(off), far * math.sin(off), 0.3, 0.0, 0.0, r)
+        measured = seen(0.0, 0.0, 0.0, half_angle, [disc])
+        assert measured == pytest.approx(expected, abs=1e-9)
+    assert seen(far, 0.0, 0.0, half_angle, [(1.7, 0.0, 0.3, 0.0, 0.0, r)]) == 0.0
+
+
 def depths(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) how deep (n, 5) rectangles overlap, by the shadows of all corners."""
+    """(n,) how deep (n, 6) rectangles overlap, by the shadows of all corners."""
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2.0
     corners = []
     for each in (a, b):
@@ -314,7 +365,7 @@ def test_first_overlap_against_a_dense_search():
     hits = passes = misses = 0
     dense = np.linspace(0.0, 1.0, 4_001)
     for _ in range(300):
-        sizes = 10.0 ** rng.uniform(-2.5, 0.0, (2, 2))
+        sizes = np.pad(10.0 ** rng.uniform(-2.5, 0.0, (2, 2)), ((0, 0), (0, 1)))
         before, now = rng.uniform(-1.0, 1.0, (2, 3))
         parts = int(rng.choice([1, 5]))
         poses = rng.uniform(-1.0, 1.0, (1, 3)) + np.cumsum(
@@ -349,6 +400,42 @@ def test_first_overlap_of_what_turns_by_a_whole_number_of_turns():
     """The heading of a path jumps by 2 pi from one of its legs to the next."""
     poses = np.array([[1.0, 0.0, math.pi], [1.0, 0.0, -math.pi]])
     still = np.zeros(3)
-    assert math.isinf(first_overlap(still, still, (1.0, 1.0), poses, (0.2, 2.0)))
+    assert math.isinf(
+        first_overlap(still, still, (1.0, 1.0, 0.0), poses, (0.2, 2.0, 0.0))
+    )
     poses[1, 0] = 0.55
-    assert first_overlap(still, still, (1.0, 1.0), poses, (0.2, 2.0)) == 1.0
+    assert first_overlap(still, still, (1.0, 1.0, 0.0), poses, (0.2, 2.0, 0.0)) == 1.0
+
+
+def test_first_overlap_with_discs_against_a_dense_search():
+    """Discs of 30 to 300 mm that pass walls of 40 mm, which turn, within a step."""
+    rng = np.random.default_rng(6)
+    dense = np.linspace(0.0, 1.0, 2_001)
+    hits = misses = 0
+    for _ in range(100):
+        disc, wall = (0.0, 0.0, rng.uniform(0.03, 0.3)), (0.5, 0.0, 0.02)
+        before, now = rng.uniform(-1.0, 1.0, (2, 3))
+        poses = rng.uniform(-0.5, 0.5, (2, 3))
+        mine = before + dense[:, None] * (now - before)
+        other = poses[0] + dense[:, None] * (poses[1] - poses[0])
+        # The distance of the center of the disc from the middle line of the wall.
+        c, s = np.cos(other[:, 2]), np.sin(other[:, 2])
+        dx, dy = (mine - other)[:, :2].T
+        along = np.maximum(np.abs(c * dx + s * dy) - 0.25, 0.0)
+        gap = np.hypot(along, c * dy - s * dx) - disc[2] - wall[2]
+        found = first_overlap(before, now, disc, poses, wall)
+        if gap[0] <= 0.0:
+            continue
+        if math.isinf(found):
+            assert gap.min() > -1e-4
+            misses += 1
+            continue
+        hits += 1
+        # A shallow touch before may have been missed, up to 0.1 mm.
+        assert gap[math.ceil(found * 2_000)] < 2e-3
+        deep = np.flatnonzero(gap < -1e-4)
+        assert not len(deep) or found <= 1.0
+        assert len(poses) == 2
+        assert found == 1.0 or gap[: math.floor(found * 2_000)].min() > -2e-4
+    assert hits > 20
+    assert misses > 20

@@ -72,6 +72,17 @@ def test_a_far_talker_has_all_votes(places, azimuth, elevation):
     assert source.confidence == pytest.approx(1.0)
 
 
+def test_steered_votes_are_more_exact_than_their_grid():
+    row = np.array([[0.0, y] for y in (-0.075, -0.025, 0.025, 0.075)])
+    off = []
+    for k, azimuth in enumerate(np.linspace(-31.0, 29.0, 7)):
+        votes = votes_of(row, waves(row, talkers(1, 1.0, k), [(azimuth, 0.0)]))
+        off.append(np.degrees(np.median(votes.azimuth[votes.steered])) - azimuth)
+    # The step of the grid is 3.3 deg, and errors of up to half of it are equally
+    # likely without the parabola: an RMS of 0.95 deg.
+    assert np.sqrt(np.mean(np.square(off))) < 0.5
+
+
 @pytest.mark.parametrize("apart", [30.0, 90.0])
 def test_talkers_at_once_are_told_apart(apart):
     directions = [(-60.0 + apart * k, 10.0) for k in range(3)]

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.special import erfinv
 
 from analysis.arrays.voting.vote_peaks import gather_sources
 from analysis.arrays.voting.vote_records import DirectionVotes
@@ -40,6 +41,21 @@ def test_where_both_kinds_of_votes_agree_is_a_source():
         math.degrees(s.bearing) for s in gather_sources(votes_at(single, steered))
     )
     assert found == pytest.approx([-50.0, 40.0], abs=1.5)
+
+
+@pytest.mark.parametrize("apart", [0.0, 6.0])
+def test_kinds_of_votes_that_differ_state_a_larger_error(apart):
+    # Normal quantiles have exactly this scatter, and no luck.
+    quantiles = np.sqrt(2.0) * erfinv(np.linspace(-0.99, 0.99, 90))
+    single = 20.0 + 0.5 * apart + 2.0 * quantiles
+    steered = 20.0 - 0.5 * apart + 2.0 * quantiles[::9]
+    (source,) = gather_sources(votes_at(single, steered))
+    # Ten independent votes of either kind: the bearing is halfway, and two values
+    # apart by d have the standard deviation d / 2.
+    assert math.degrees(source.bearing) == pytest.approx(20.0, abs=0.3)
+    assert math.degrees(source.common_std) == pytest.approx(
+        math.hypot(0.5 * apart, 0.25), abs=0.25
+    )
 
 
 def test_where_no_single_bin_votes_is_no_source():

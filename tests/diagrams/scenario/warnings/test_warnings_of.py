@@ -107,7 +107,7 @@ def test_speeds_of_corners_are_those_of_places(name, settings):
     ]
     (body,) = moving
     times = np.arange(0.0, scenario.duration_s, 0.001)
-    corners = np.array([rectangle_corners(r) for r in body.rectangles(times)])
+    corners = np.array([rectangle_corners(r) for r in body.rectangles_over(times)[0]])
     steps = np.linalg.norm(np.diff(corners, axis=0), axis=2)
     fastest = float(steps.max()) / 0.001
     assert fastest > 0.5

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient
 
+from phonotaxis.testing import Bench, assert_linearization, evaluate
 from systems.base.robot import RobotParameters
 from systems.hearing.parameters import TrackerParameters
 from systems.hearing.tracking.source_tracker import SourceTracker
@@ -25,13 +26,13 @@ pytestmark = pytest.mark.drake
 PLAIN = TrackerParameters(hold="world")
 #: As for ideal hearing: every source is where it is heard.
 EXACT: Any = {"resolve_front_back": False, "floor_m": 0.0}
-SILENT = {
+SILENT: dict[str, Any] = {
     "p_PS_B": [0.0, 0.0],
     "covariance": [0.0] * 4,
     "detected": [0.0],
     "range_valid": [0.0],
 }
-HEARD = {
+HEARD: dict[str, Any] = {
     "p_PS_B": [2.0, 1.0],
     "covariance": [0.04, 0.01, 0.01, 0.09],
     "detected": [1.0],
@@ -73,21 +74,16 @@ class Steps:
         return outputs[0]
 
 
-def make_bench(bench, tracker=PLAIN, *, pose=NORTH, heard=True, state=None, age=0.025):
+def make_bench(tracker=PLAIN, *, pose=NORTH, heard=True, state=None, age=0.025):
     block = SourceTracker(tracker=tracker, measurement_age_s=age, exact=True)
     state = track_state(tracker, pose) if state is None else state
     signals = HEARD if heard else SILENT
-    return bench(block, state=state, pose_WB_estimated=pose, **signals)
+    return Bench(block, state=state, pose_WB_estimated=pose, **signals)
 
 
-def hear(at, **signals) -> None:
-    for name, value in signals.items():
-        at.block.GetInputPort(name).FixValue(at.context, np.asarray(value, float))
-
-
-def test_places_an_estimate_in_the_world(bench):
+def test_places_an_estimate_in_the_world():
     """P at (1, 1.175) facing north; 2 m ahead and 1 m to the left."""
-    at = make_bench(bench)
+    at = make_bench()
     np.testing.assert_allclose(at.output("p_WS_estimated"), [0.0, 3.175], atol=1e-12)
     np.testing.assert_array_equal(at.output("v_WS_estimated"), [0.0, 0.0])
     assert at.output("target_valid")[0] == 1.0
@@ -95,10 +91,10 @@ def test_places_an_estimate_in_the_world(bench):
 
 
 @pytest.mark.parametrize("hold", HOLDS)
-def test_covariance_turns_with_the_robot(bench, hold):
+def test_covariance_turns_with_the_robot(hold):
     """A tick later a velocity of 0.35 m/s says 9 mm in each direction."""
     pose = [0.0, 0.0, 0.7]
-    at = make_bench(bench, plain(hold=hold), pose=pose)
+    at = make_bench(plain(hold=hold), pose=pose)
     c, s = math.cos(0.7), math.sin(0.7)
     R = np.array([[c, -s], [s, c]])
     C = R @ np.array(HEARD["covariance"]).reshape(2, 2) @ R.T
@@ -106,23 +102,23 @@ def test_covariance_turns_with_the_robot(bench, hold):
     np.testing.assert_allclose(at.output("covariance_W"), C.ravel(), atol=1e-6)
 
 
-def test_a_floor_adds_to_the_covariance_of_estimates_from_audio(bench):
+def test_a_floor_adds_to_the_covariance_of_estimates_from_audio():
     less, more = (
-        bench(
+        evaluate(
             SourceTracker(tracker=PLAIN, exact=exact),
             state=track_state(PLAIN, NORTH, exact=exact),
             pose_WB_estimated=NORTH,
             **HEARD,
-        ).output("covariance_W")
+        )["covariance_W"]
         for exact in (True, False)
     )
     np.testing.assert_allclose(more - less, [1e-4, 0.0, 0.0, 1e-4], atol=1e-12)
 
 
-def test_an_estimate_belongs_to_the_pose_of_its_moment(bench):
+def test_an_estimate_belongs_to_the_pose_of_its_moment():
     """The robot has driven 0.1 m since: the source has not."""
     state = track_state(PLAIN, [1.0, 0.9, math.pi / 2])
-    at = make_bench(bench, state=state)
+    at = make_bench(state=state)
     np.testing.assert_allclose(at.output("p_WS_estimated"), [0.0, 3.075], atol=1e-12)
 
 
@@ -136,34 +132,34 @@ def test_past_pose_lies_on_a_line_between_ticks(ticks, x):
     assert pose == pytest.approx([x, 0.0, x / 10])
 
 
-def test_target_rests_in_the_world_between_bursts(bench):
-    at = make_bench(bench).tick()
-    hear(at, **SILENT, pose_WB_estimated=[5.0, 5.0, 0.0])
+def test_target_rests_in_the_world_between_bursts():
+    at = make_bench().tick()
+    at.set(**SILENT, pose_WB_estimated=[5.0, 5.0, 0.0])
     np.testing.assert_allclose(at.output("p_WS_estimated"), [0.0, 3.175], atol=1e-12)
 
 
-def test_target_moves_with_the_robot_when_held_so(bench):
+def test_target_moves_with_the_robot_when_held_so():
     """From the new pose, P at (5.175, 5), the target is (2, 1) ahead again."""
-    at = make_bench(bench, plain(hold="robot")).tick()
-    hear(at, **SILENT, pose_WB_estimated=[5.0, 5.0, 0.0])
+    at = make_bench(plain(hold="robot")).tick()
+    at.set(**SILENT, pose_WB_estimated=[5.0, 5.0, 0.0])
     np.testing.assert_allclose(at.output("p_WS_estimated"), [7.175, 6.0], atol=1e-12)
 
 
-def moving_source(bench, hold: str):
+def moving_source(hold: str):
     """A bench that has heard a source pass at 0.3 m/s along y, exactly, for 1 s."""
-    at = make_bench(bench, plain(hold=hold), pose=[0.0, 0.0, 0.0], heard=False)
+    at = make_bench(plain(hold=hold), pose=[0.0, 0.0, 0.0], heard=False)
     for tick in range(41):
-        hear(at, **HEARD | {"covariance": [0.0] * 4})
-        hear(at, p_PS_B=[2.0, 0.3 * 0.025 * tick])
+        at.set(**HEARD | {"covariance": [0.0] * 4})
+        at.set(p_PS_B=[2.0, 0.3 * 0.025 * tick])
         at.tick()
-    hear(at, **SILENT)
+    at.set(**SILENT)
     return at
 
 
 @pytest.mark.parametrize("hold", HOLDS)
-def test_velocity_is_found_and_fades(bench, hold):
+def test_velocity_is_found_and_fades(hold):
     """Towards 0 with 5 s; what was found within 1 s is some 2 % less than 0.3."""
-    at = moving_source(bench, hold)
+    at = moving_source(hold)
     first = at.output("v_WS_estimated")
     np.testing.assert_allclose(first, [0.0, 0.3], atol=0.01)
     for _ in range(40):
@@ -172,9 +168,9 @@ def test_velocity_is_found_and_fades(bench, hold):
     np.testing.assert_allclose(then, first * math.exp(-1.0 / 5.0), atol=1e-12)
 
 
-def test_target_goes_on_with_its_velocity_when_held_so(bench):
+def test_target_goes_on_with_its_velocity_when_held_so():
     """After t the way is 5 s (1 - exp(-t / 5 s)) times the last velocity."""
-    at, rests = moving_source(bench, "motion"), moving_source(bench, "world")
+    at, rests = moving_source("motion"), moving_source("world")
     held = rests.output("p_WS_estimated")
     np.testing.assert_allclose(held, [2.175, 0.3], atol=1e-12)
     for tick in range(40):
@@ -187,9 +183,9 @@ def test_target_goes_on_with_its_velocity_when_held_so(bench):
 
 
 @pytest.mark.parametrize("hold", ["world", "robot"])
-def test_covariance_counts_where_the_source_is_expected_instead(bench, hold):
+def test_covariance_counts_where_the_source_is_expected_instead(hold):
     """E|x - held|^2 = E|x - expected|^2 + |held - expected|^2."""
-    benches = [moving_source(bench, name) for name in (hold, "motion")]
+    benches = [moving_source(name) for name in (hold, "motion")]
     for at in benches:
         for _ in range(40):
             at.tick()
@@ -200,9 +196,9 @@ def test_covariance_counts_where_the_source_is_expected_instead(bench, hold):
     np.testing.assert_allclose(C_held, C_expected + np.outer(off, off), atol=1e-12)
 
 
-def test_age_grows_by_a_tick_and_ends_in_a_lost_target(bench):
-    at = make_bench(bench, plain(maximum_age_s=0.2)).tick()
-    hear(at, **SILENT)
+def test_age_grows_by_a_tick_and_ends_in_a_lost_target():
+    at = make_bench(plain(maximum_age_s=0.2)).tick()
+    at.set(**SILENT)
     valid = []
     for tick in range(10):
         assert at.output("age")[0] == pytest.approx(0.05 + 0.025 * tick)
@@ -214,8 +210,8 @@ def test_age_grows_by_a_tick_and_ends_in_a_lost_target(bench):
 
 
 @pytest.mark.parametrize("hold", HOLDS)
-def test_nothing_heard_yet_is_no_target(bench, hold):
-    at = make_bench(bench, plain(hold=hold), heard=False)
+def test_nothing_heard_yet_is_no_target(hold):
+    at = make_bench(plain(hold=hold), heard=False)
     for _ in range(3):
         assert at.output("target_valid")[0] == 0.0
         for name in ("p_WS_estimated", "v_WS_estimated", "covariance_W"):
@@ -223,32 +219,32 @@ def test_nothing_heard_yet_is_no_target(bench, hold):
         at.tick()
 
 
-def test_first_bearing_alone_uses_the_assumed_range(bench):
-    at = make_bench(bench)
-    hear(at, p_PS_B=[0.6, 0.8], range_valid=[0.0])
+def test_first_bearing_alone_uses_the_assumed_range():
+    at = make_bench()
+    at.set(p_PS_B=[0.6, 0.8], range_valid=[0.0])
     expected = [1.0 - 0.8 * 3.0, 1.175 + 0.6 * 3.0]
     np.testing.assert_allclose(at.output("p_WS_estimated"), expected, atol=1e-12)
 
 
-def test_bearings_are_taken_from_the_middle_of_the_microphones(bench):
+def test_bearings_are_taken_from_the_middle_of_the_microphones():
     """Which are 0.1 m behind P and 0.2 m to its left; north is ahead."""
     places = ((-0.1, 0.5), (-0.1, 0.2), (-0.1, -0.1))
     robot = RobotParameters(microphones_m=places)
     block = SourceTracker(robot=robot, tracker=PLAIN, exact=True)
     state = track_state(PLAIN, NORTH, robot=robot)
-    at = bench(block, state=state, pose_WB_estimated=NORTH, **HEARD)
-    hear(at, p_PS_B=[1.0, 0.0], range_valid=[0.0])
+    at = Bench(block, state=state, pose_WB_estimated=NORTH, **HEARD)
+    at.set(p_PS_B=[1.0, 0.0], range_valid=[0.0])
     expected = [1.0 - 0.2, 1.175 - 0.1 + 3.0]
     np.testing.assert_allclose(at.output("p_WS_estimated"), expected, atol=1e-12)
 
 
-def test_a_bearing_moves_the_target_across_itself(bench):
+def test_a_bearing_moves_the_target_across_itself():
     """The target is at (0, 3.175), 2 m ahead of P and 1 m to the left."""
-    at = make_bench(bench).tick()
+    at = make_bench().tick()
     u = np.array([2.0, 1.03]) / math.hypot(2.0, 1.03)
     n = np.array([-u[1], u[0]])
     C = 1e-8 * np.outer(n, n)
-    hear(at, p_PS_B=u, range_valid=[0.0], covariance=C.ravel())
+    at.set(p_PS_B=u, range_valid=[0.0], covariance=C.ravel())
     moved = at.output("p_WS_estimated") - [1.0, 1.175]
     ahead, left = moved[1], -moved[0]
     assert left / ahead == pytest.approx(1.03 / 2.0, abs=1e-5)
@@ -271,22 +267,22 @@ def test_exact_estimates_are_the_target(steps):
         before = pose
 
 
-def test_exact_estimates_have_the_derivative_of_the_target(bench):
+def test_exact_estimates_have_the_derivative_of_the_target():
     """The identity, turned into W, whatever the tracker remembers."""
-    at = moving_source(bench, "world")
+    at = moving_source("world")
     state = at.context.get_discrete_state(0).CopyToVector()
     block = at.block.ToAutoDiffXd()
     x = [AutoDiffXd(2.0, 2, 0), AutoDiffXd(0.31, 2, 1)]
     signals = HEARD | {"p_PS_B": x, "covariance": [0.0] * 4}
-    dual = bench(block, state=state, pose_WB_estimated=[0.0, 0.0, 0.0], **signals)
+    dual = Bench(block, state=state, pose_WB_estimated=[0.0, 0.0, 0.0], **signals)
     gradient = ExtractGradient(dual.output("p_WS_estimated").reshape(-1, 1))
     np.testing.assert_allclose(gradient, np.eye(2), atol=1e-12)
 
 
-def test_an_outlier_is_dropped_and_the_third_in_a_row_is_believed(bench):
+def test_an_outlier_is_dropped_and_the_third_in_a_row_is_believed():
     """The target is at (0, 3.175); 9 m ahead is (0, 10.175)."""
-    at = make_bench(bench).tick()
-    hear(at, p_PS_B=[9.0, 1.0])
+    at = make_bench().tick()
+    at.set(p_PS_B=[9.0, 1.0])
     for tick in range(2):
         np.testing.assert_allclose(
             at.output("p_WS_estimated"), [0.0, 3.175], atol=1e-12
@@ -297,12 +293,12 @@ def test_an_outlier_is_dropped_and_the_third_in_a_row_is_believed(bench):
     assert at.output("age")[0] == 0.025
 
 
-def mirror_run(bench, p_WS, tracker, *, turn_rate: float, microphones=None):
+def mirror_run(p_WS, tracker, *, turn_rate: float, microphones=None):
     """Targets while the robot turns on the spot and hears the candidate ahead."""
     robot = RobotParameters(**({"microphones_m": microphones} if microphones else {}))
     block = SourceTracker(robot=robot, tracker=tracker, measurement_age_s=0.0)
     state = track_state(tracker, [0.0, 0.0, 0.0], robot=robot, exact=False)
-    at = bench(block, state=state, pose_WB_estimated=[0.0] * 3, **HEARD)
+    at = Bench(block, state=state, pose_WB_estimated=[0.0] * 3, **HEARD)
     along_x = microphones is not None
     targets = []
     for tick in range(81):
@@ -311,39 +307,37 @@ def mirror_run(bench, p_WS, tracker, *, turn_rate: float, microphones=None):
         x = c * p_WS[0] + s * p_WS[1] - 0.175
         y = -s * p_WS[0] + c * p_WS[1]
         heard = [x, abs(y)] if along_x else [abs(x), y]
-        hear(at, p_PS_B=heard, covariance=[1e-5, 0.0, 0.0, 1e-5])
-        hear(at, pose_WB_estimated=[0.0, 0.0, theta])
+        at.set(p_PS_B=heard, covariance=[1e-5, 0.0, 0.0, 1e-5])
+        at.set(pose_WB_estimated=[0.0, 0.0, theta])
         targets.append(at.output("p_WS_estimated"))
         at.tick()
     return np.array(targets)
 
 
 @pytest.mark.parametrize("p_WS", [(-2.0, 0.7), (-1.5, -1.0), (2.0, 0.7)])
-def test_turning_tells_front_from_back(bench, p_WS):
-    targets = mirror_run(bench, p_WS, TrackerParameters(), turn_rate=0.5)
+def test_turning_tells_front_from_back(p_WS):
+    targets = mirror_run(p_WS, TrackerParameters(), turn_rate=0.5)
     np.testing.assert_allclose(targets[-1], p_WS, atol=1e-3)
 
 
 @pytest.mark.parametrize("p_WS", [(1.0, 1.7), (1.0, -1.7)])
-def test_turning_tells_left_from_right_of_a_row_along_x(bench, p_WS):
+def test_turning_tells_left_from_right_of_a_row_along_x(p_WS):
     """The candidate that is reported is the one to the left."""
     row = ((0.2, 0.0), (0.0, 0.0), (-0.2, 0.0))
-    targets = mirror_run(
-        bench, p_WS, TrackerParameters(), turn_rate=0.5, microphones=row
-    )
+    targets = mirror_run(p_WS, TrackerParameters(), turn_rate=0.5, microphones=row)
     np.testing.assert_allclose(targets[-1], p_WS, atol=1e-3)
 
 
 @pytest.mark.parametrize("exact", [True, False])
-def test_without_a_question_every_source_is_where_it_is_heard(bench, exact):
+def test_without_a_question_every_source_is_where_it_is_heard(exact):
     """Ideal hearing; or microphones in a triangle, which know."""
     triangle = ((0.2, 0.0), (-0.1, 0.2), (-0.1, -0.2))
     robot = RobotParameters(microphones_m=triangle)
     block = SourceTracker(robot=robot, exact=exact)
     state = track_state(TrackerParameters(), [0.0] * 3, robot=robot, exact=exact)
     assert len(state) == len(track_state(PLAIN, [0.0] * 3)), "one hypothesis each"
-    at = bench(block, state=state, pose_WB_estimated=[0.0] * 3, **HEARD)
-    np.testing.assert_allclose(at.output("p_WS_estimated"), [2.175, 1.0])
+    outputs = evaluate(block, state=state, pose_WB_estimated=[0.0] * 3, **HEARD)
+    np.testing.assert_allclose(outputs["p_WS_estimated"], [2.175, 1.0])
 
 
 def test_a_measurement_cannot_be_older_than_two_seconds():
@@ -366,28 +360,26 @@ def warm_memory(tracker, robot, *, exact):
 @pytest.mark.parametrize("hold", HOLDS)
 @pytest.mark.parametrize("signal", ["fix", "bearing", "silence"])
 @pytest.mark.parametrize("exact", [True, False])
-def test_gradient(bench, check_gradient, hold, signal, exact):
+def test_gradient(hold, signal, exact):
     """With respect to estimate, pose, past poses and the tracks' states."""
     robot = RobotParameters(control_point_m=0.2)
     tracker = TrackerParameters(hold=hold)
     memory = warm_memory(tracker, robot, exact=exact)
-    moved = slice(13, 17)  # position and velocity of the track ahead
-
-    def respond(block, x):
-        state = [*x[5:14], *memory[9:]]
-        state[moved] = x[14:]
-        signals = HEARD | {"p_PS_B": x[:2], "covariance": [1e-4, 2e-5, 2e-5, 2e-4]}
-        if signal == "bearing":
-            signals |= {"range_valid": [0.0], "covariance": [4e-6, 0.0, 0.0, 4e-5]}
-        elif signal == "silence":
-            signals |= {"detected": [0.0]}
-        at = bench(block, state=state, pose_WB_estimated=x[2:5], **signals)
-        outputs = [*at.output("p_WS_estimated"), *at.output("v_WS_estimated")]
-        return [*outputs, *at.output("covariance_W"), *at.output("age"), *at.updated()]
-
+    # Past poses, and position and velocity of the track ahead, are moved.
+    fixed = [f"state[{k}]" for k in (*range(9, 13), *range(17, len(memory)))]
+    signals = HEARD | {"covariance": [1e-4, 2e-5, 2e-5, 2e-4]}
+    if signal == "bearing":
+        signals |= {"range_valid": [0.0], "covariance": [4e-6, 0.0, 0.0, 4e-5]}
+    elif signal == "silence":
+        signals |= {"detected": [0.0]}
+    heard = [0.943, 0.331] if signal == "bearing" else [1.69, 0.61]
     block = SourceTracker(
         robot=robot, tracker=tracker, measurement_age_s=0.0375, exact=exact
     )
-    heard = [0.943, 0.331] if signal == "bearing" else [1.69, 0.61]
-    point = [*heard, 0.11, 0.2, 0.37, *memory[:9], *memory[moved]]
-    check_gradient(block, respond, point, tolerance=2e-5)
+    assert_linearization(
+        block,
+        state=memory,
+        pose_WB_estimated=[0.11, 0.2, 0.37],
+        **signals | {"p_PS_B": heard},
+        hold=[*HEARD.keys() - {"p_PS_B"}, *fixed],
+    )

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from phonotaxis.testing import evaluate
 from systems.laws.trajectory.trajectory_adaptive import AdaptiveTrajectoryParameters
 from systems.laws.trajectory.trajectory_conventional import (
     TrajectoryImpedanceParameters,
@@ -160,20 +161,17 @@ def test_pulled_through_an_obstacle_only_with_enough_lag():
 
 def test_the_block_adds_both_and_limits_the_acceleration():
     block = TrajectoryImpedanceController(parameters=FADING, robot=ROBOT)
-    context = block.CreateDefaultContext()
-    values = {
-        "target_state": [0.5, 0.0, 0.1, 0.0],
-        "objects_W": objects_of([1, 0.0, 0.4, 0.0, 0.0, 1.0]),
-        "pose_WB_estimated": [0.0, 0.0, 0.0],
-        "v_WP": [0.0, 0.05],
-    }
-    for name, value in values.items():
-        block.GetInputPort(name).FixValue(context, np.array(value))
-    forces = block.GetOutputPort("forces_W").Eval(context)
+    outputs = evaluate(
+        block,
+        target_state=[0.5, 0.0, 0.1, 0.0],
+        objects_W=objects_of([1, 0.0, 0.4, 0.0, 0.0, 1.0]),
+        pose_WB_estimated=[0.0, 0.0, 0.0],
+        v_WP=[0.0, 0.05],
+    )
     pull = [3.0 * (0.5 - 0.08) + 4.0 * 0.1, -4.0 * 0.05]
     off = [0.0, -3.0 * 0.6 - 4.0 * 0.6 * 0.05]
-    np.testing.assert_allclose(forces, [*pull, *off], atol=1e-9)
-    command = block.GetOutputPort("acceleration_W").Eval(context)
+    np.testing.assert_allclose(outputs["forces_W"], [*pull, *off], atol=1e-9)
+    command = outputs["acceleration_W"]
     wanted = np.add(pull, off)
     assert np.linalg.norm(wanted) > 2.5
     np.testing.assert_allclose(command, 2.5 * wanted / np.linalg.norm(wanted))
@@ -202,17 +200,15 @@ def test_eq_6_stops_the_virtual_mass_at_once(distance, speed, stops):
     for block_m in (None, 0.2):
         own = CONVENTIONAL.model_copy(update={"block_distance_m": block_m})
         block = TrajectoryImpedanceController(parameters=own, robot=ROBOT)
-        context = block.CreateDefaultContext()
-        values = {
-            "target_state": [0.08 + (1.0 - distance), 0.0, speed, 0.0],
-            "objects_W": objects_of([1, distance, 0.0, speed, 0.0, 1.0]),
+        outputs = evaluate(
+            block,
+            target_state=[0.08 + (1.0 - distance), 0.0, speed, 0.0],
+            objects_W=objects_of([1, distance, 0.0, speed, 0.0, 1.0]),
             # A target that moves straight back would drive it aside.
-            "pose_WB_estimated": [0.08, -0.08, math.pi / 2.0],
-            "v_WP": [speed, 0.0],
-        }
-        for name, value in values.items():
-            block.GetInputPort(name).FixValue(context, np.array(value))
-        accelerations.append(block.GetOutputPort("acceleration_W").Eval(context))
+            pose_WB_estimated=[0.08, -0.08, math.pi / 2.0],
+            v_WP=[speed, 0.0],
+        )
+        accelerations.append(outputs["acceleration_W"])
     free, held = accelerations
     # Spring and target balance.
     np.testing.assert_allclose(free, 0.0, atol=1e-12)
