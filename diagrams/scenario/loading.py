@@ -61,7 +61,7 @@ def load_scenario(
     if isinstance(source, Mapping):
         data = {"name": "scenario", **dict(plain_settings(source))}
     else:
-        data = written_fields(source)
+        data = written_fields(source, law=settings.get("law"))
     apply_settings(data, settings)
     resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
@@ -111,7 +111,7 @@ def scenario_text(source: str | Path) -> str:
     return path.read_text("utf-8")
 
 
-def written_fields(source: str | Path) -> dict[str, Any]:
+def written_fields(source: str | Path, *, law: Any = None) -> dict[str, Any]:
     """Reads the fields that the file of a scenario sets.
 
     Names of fields from the previous version are replaced by the present names. Paths
@@ -120,6 +120,8 @@ def written_fields(source: str | Path) -> dict[str, Any]:
 
     Args:
         source: A name from the library, or the path of a file.
+        law: Law that will replace the law of the file, on which the present names of
+            some fields depend. None: the law of the file.
 
     Returns:
         Plain values of the fields.
@@ -130,7 +132,7 @@ def written_fields(source: str | Path) -> dict[str, Any]:
     from diagrams.scenario.former_fields import renewed
 
     path = _find(source)
-    data = renewed(read_mapping(path))
+    data = renewed(read_mapping(path), law)
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
     return data
