@@ -54,8 +54,8 @@ class LiveView(LeafSystem):
                 self.DeclareVectorInputPort(f"{name}.{port}", size)
         for name in scenario.sources:
             self.DeclareVectorInputPort(f"{name}.pose_WS", 3)
-        if scenario.obstacles:
-            size = 3 * len(scenario.obstacles)
+        if scenario.all_obstacles:
+            size = 3 * len(scenario.all_obstacles)
             self.DeclareVectorInputPort("obstacles.poses_WO", size)
         period = scenario.tick_s * math.ceil(_PERIOD_S / scenario.tick_s - 1e-9)
         self.DeclareInitializationPublishEvent(self._start)

@@ -123,8 +123,8 @@ def is_constant_now(path: str, value: Any) -> bool:
     if value != former.value:
         raise InputError(
             path,
-            f"is {value!r}, but this is no longer a field; it is now "
-            f"{constant_now(own)}; leave it out",
+            f"is {value!r}, but this is no longer a field; {constant_now(own)}; leave "
+            "it out",
         )
     return True
 
@@ -133,11 +133,14 @@ def constant_now(path: str) -> str:
     """Returns the constant that has replaced a field of the previous version.
 
     ``path`` is the dotted path of the field. The result is the place and value of the
-    constant in words, or an empty text if no constant has replaced the field.
+    constant in words, or why the field has no effect. It is an empty text if the field
+    is no former field, or has a new name.
     """
     for former in former_fields():
         if former.path == path and not former.new:
-            return f"the constant {former.place} = {former.value!r}"
+            if former.value is _MISSING:
+                return f"it has no effect: {former.place}"
+            return f"it is now the constant {former.place} = {former.value!r}"
     return ""
 
 
@@ -176,7 +179,7 @@ def _renewed(where: str, fields: dict[str, Any], law: Any) -> Iterator[str]:
         elif value != former.value:
             raise InputError(
                 f"{where}{path}",
-                f"is {value!r}, but this is no longer a field; it is now "
+                f"is {value!r}, but this is no longer a field; "
                 f"{constant_now(former.path)}; remove it",
             )
         else:

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict
 
+from diagrams.scenario.map_parameters import MapParameters
 from systems.framework.parameters import (
     Duration,
     Length,
@@ -76,6 +77,8 @@ class RunParameters(Parameters):
     obstacles: Annotated[
         tuple[ObstacleParameters, ...], Strict(False), Field(max_length=1_000)
     ] = ()
+    map: MapParameters | None = None
+    """Walls from a map file. null: there is no map."""
     stop: StopParameters = StopParameters()
     sound_speed_m_s: SoundSpeed = SOUND_SPEED_M_S
     """Speed of sound, m/s (Han 2019, 2.1)."""

@@ -36,6 +36,7 @@ from diagrams.scenario.checks.guard_checks import check_guard
 from diagrams.scenario.checks.search_checks import check_searches
 from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.fields.shipped import scenario_schema
+from diagrams.scenario.map_parameters import MapParameters
 from diagrams.scenario.participants import (
     AnyRobot,
     Follower,
@@ -62,6 +63,7 @@ from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
 from systems.odor.parameters import CONTAINER_M
 from systems.sound.parameters import SoundParameters
+from systems.world.parameters import ObstacleParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
 from systems.world.shapes import box
@@ -206,6 +208,11 @@ class Scenario(RunParameters):
         return max(map(frame_of, self.robots.values()))
 
     @property
+    def all_obstacles(self) -> tuple[ObstacleParameters | MapParameters, ...]:
+        """The obstacles, and the map as the last one if there is a map."""
+        return self.obstacles if self.map is None else (*self.obstacles, self.map)
+
+    @property
     def law_names(self) -> str:
         """The laws of all robots, each once, separated by commas."""
         return ", ".join(dict.fromkeys(robot.law for robot in self.robots.values()))
@@ -330,7 +337,7 @@ class Scenario(RunParameters):
         """
         robot = robot or next(iter(self.robots))
         target, paths = self.target(robot), paths or {}
-        bodies = {o.name: Body(o.path(), o.shape()) for o in self.obstacles}
+        bodies = {o.name: Body(o.path(), o.shape()) for o in self.all_obstacles}
         for name, other in self.robots.items():
             if name != robot:
                 start = RecordedPath(np.zeros(1), np.array([other.start.pose]))
@@ -363,7 +370,7 @@ class Scenario(RunParameters):
         """(n, 6) rectangles of the known obstacles at rest, m and rad."""
         still = [
             Body(obstacle.path(), obstacle.shape()).rectangles(0.0)
-            for obstacle in self.obstacles
+            for obstacle in self.all_obstacles
             if obstacle.known and not obstacle.path().moves
         ]
         return np.concatenate([np.empty((0, 6)), *still])
@@ -413,7 +420,7 @@ class Scenario(RunParameters):
         faults = []
         for check in (
             lambda: check_goals(self.robots, self.stop.diverged_range_m),
-            lambda: check_filled_goals(self.robots, self.obstacles),
+            lambda: check_filled_goals(self.robots, self.all_obstacles),
             self._check_rates,
             self._check_step,
             self._check_room,
@@ -438,7 +445,7 @@ class Scenario(RunParameters):
         taken += self.robots
         for field, names in (
             ("sources", self.sources),
-            ("obstacles", [obstacle.name for obstacle in self.obstacles]),
+            ("obstacles", [obstacle.name for obstacle in self.all_obstacles]),
         ):
             for name in names:
                 if name in taken:
@@ -567,8 +574,9 @@ class Scenario(RunParameters):
                     f"robot {second!r} at {self.robots[second].start.position_m} "
                     f"overlaps robot {first!r}; move one of them",
                 )
-        still = {o.name: Body(o.path(), o.shape()) for o in self.obstacles}
+        still = {o.name: Body(o.path(), o.shape()) for o in self.all_obstacles}
         fields = [f"obstacles.{k}" for k in range(len(self.obstacles))]
+        fields += ["map.file"] if self.map is not None else []
         for name, source in self.sources.items():
             if source.body:
                 shape = box((source.length_m, source.width_m))
