@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from diagrams.scenario.ros_map import RosMap, read_header, read_ros_map
 from diagrams.scenario.yaml_text import dump_yaml
+from systems.framework.input_error import InputError
 from systems.framework.parameters import Line, Parameters
 from systems.world.paths import WaypointPath
 from systems.world.shapes import Shape
@@ -32,13 +33,16 @@ class MapParameters(Parameters):
 
     @model_validator(mode="after")
     def _check(self) -> MapParameters:
-        read_ros_map(self.file, "file")
+        try:
+            read_ros_map(self.file)
+        except InputError as error:
+            raise InputError(error.field.removeprefix("map."), error.message) from None
         return self
 
     @property
     def cells(self) -> RosMap:
         """The cells of the map."""
-        return read_ros_map(self.file, "file")
+        return read_ros_map(self.file)
 
     def shape(self) -> Shape:
         """Returns the occupied cells as rectangles, in the axes of the map."""

@@ -33,6 +33,7 @@ from diagrams.scenario.bodies import (
 )
 from diagrams.scenario.checks.goal_checks import check_filled_goals, check_goals
 from diagrams.scenario.checks.guard_checks import check_guard
+from diagrams.scenario.checks.map_checks import check_map
 from diagrams.scenario.checks.search_checks import check_searches
 from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.fields.shipped import scenario_schema
@@ -425,6 +426,7 @@ class Scenario(RunParameters):
             self._check_step,
             self._check_room,
             self._check_start,
+            lambda: check_map(self.map, self.robots, self.sources, self.obstacles),
             self._check_guards,
         ):
             try:
@@ -574,9 +576,8 @@ class Scenario(RunParameters):
                     f"robot {second!r} at {self.robots[second].start.position_m} "
                     f"overlaps robot {first!r}; move one of them",
                 )
-        still = {o.name: Body(o.path(), o.shape()) for o in self.all_obstacles}
+        still = {o.name: Body(o.path(), o.shape()) for o in self.obstacles}
         fields = [f"obstacles.{k}" for k in range(len(self.obstacles))]
-        fields += ["map.file"] if self.map is not None else []
         for name, source in self.sources.items():
             if source.body:
                 shape = box((source.length_m, source.width_m))
