@@ -25,7 +25,7 @@ from analysis.report.file_names import distinct_names
 from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.loading import (
     SCENARIO_FILE,
-    resolve_sound,
+    resolve_files,
     written_fields,
 )
 from diagrams.scenario.own_code import own_files
@@ -161,7 +161,7 @@ class SweepPlan(Parameters):
         data = written_fields(self.source)
         _state_lists(data, scenario_from_mapping(data), self.set)
         apply_settings(data, copy.deepcopy(self.set), Path(self.folder))
-        resolve_sound(data, Path(self.folder))
+        resolve_files(data, Path(self.folder))
         _state_lists(data, scenario_from_mapping(data), self.paths)
         return data
 
@@ -250,7 +250,7 @@ class SweepPlan(Parameters):
         data = pickle.loads(self._base_copy)
         apply_settings(data, copy.deepcopy(point.fields), Path(self.folder))
         data["seed"] = point.seed
-        resolve_sound(data, Path(self.folder))
+        resolve_files(data, Path(self.folder))
         return scenario_from_mapping(data)
 
     @property

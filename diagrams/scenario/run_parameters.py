@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict
 
+from diagrams.scenario.map_parameters import MapParameters
 from systems.framework.parameters import (
     Duration,
     Length,
@@ -83,6 +84,8 @@ class RunParameters(Parameters):
     obstacles: Annotated[
         tuple[ObstacleParameters, ...], Strict(False), Field(max_length=1_000)
     ] = ()
+    map: MapParameters | None = None
+    """Walls from a map file. null: there is no map."""
     stop: StopParameters = StopParameters()
     reference_path_m: Length | None = None
     """Length of a reference path from start to goal, m, for the metrics ``score`` and
