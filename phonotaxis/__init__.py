@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from phonotaxis.delays import DelayResult, calibrate_delays, locate_delays
     from phonotaxis.law_runs import LawsResult, simulate_laws
     from phonotaxis.listening import ListenResult, listen
-    from phonotaxis.listings import Listing, laws, scenarios
+    from phonotaxis.listings import Listing, laws, scenarios, worlds
     from phonotaxis.loops import DesignResult, StabilityResult, design, stability
     from phonotaxis.recordings import (
         CalibrationResult,
@@ -99,6 +99,7 @@ __all__ = [
     "simulate_laws",
     "stability",
     "sweep",
+    "worlds",
 ]
 
 #: Version of the installed package.
@@ -153,6 +154,7 @@ _HOMES = {
     "simulate_laws": "phonotaxis.law_runs",
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",
+    "worlds": "phonotaxis.listings",
 }
 
 refuse_clashes()

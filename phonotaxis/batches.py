@@ -15,7 +15,11 @@ from analysis.batches.batch import (
     prepare_batch,
     prepare_comparison,
 )
-from analysis.batches.comparison_plans import EXPERIMENTS, comparison_plan
+from analysis.batches.comparison_plans import (
+    EXPERIMENTS,
+    WORLD_SCENARIO,
+    comparison_plan,
+)
 from analysis.batches.figures import batch_figures
 from analysis.batches.page import write_batch
 from analysis.batches.plan import SweepPlan, load_sweep
@@ -23,6 +27,7 @@ from analysis.batches.plots import plot_cells, plot_over
 from analysis.batches.report import batch_document, batch_text, warning_lines
 from analysis.report.result_directory import whole_directory
 from diagrams.scenario.suggestions import Laws
+from diagrams.scenario.worlds.catalog import chosen_worlds
 from phonotaxis.result import Prepared, Result, ignore
 from systems.framework.input_error import InputError
 
@@ -235,10 +240,13 @@ def prepare_sweep(
 def compare(
     *scenarios: str | Path,
     laws: Laws | None = None,
-    runs: int = 50,
+    runs: int | None = None,
     seed: int = 1,
     settings: Mapping[str, Any] | None = None,
     grid: Mapping[str, Sequence[Any]] | None = None,
+    worlds: str | Path | None = None,
+    every: int = 1,
+    only: Sequence[str | int] = (),
     out: str | Path | None = None,
     workers: int | None = None,
     resume: bool = False,
@@ -251,16 +259,22 @@ def compare(
     Args:
         *scenarios: Names of scenarios in the library, YAML files of layouts, or YAML
             files of scenarios. If none are given, the four experiments of the papers
-            are run.
+            are run, or ``barn`` in worlds.
         laws: Names of the laws, as a list or as one text with commas. Functions and
             classes at the top level of a module may replace names. ``all`` means every
             law for robots of this kind. None means the laws of the papers and
             driving without avoidance. For a scenario with routes, None means the laws
-            for routes.
-        runs: Number of layouts per scenario. Every law meets each layout.
+            for routes, and in worlds ``guarded`` and ``dwa``.
+        runs: Number of layouts per scenario, or of runs in each world. Every law meets
+            each layout. None means 50 layouts, or one run in each world.
         seed: Seed of the layouts and of the noise.
         settings: Values of other fields of the scenarios, by dotted path.
         grid: Lists of values of other fields to compare, by dotted path.
+        worlds: Folder with worlds (docs/worlds.md), or ``shipped`` for those that come
+            with phonotaxis. They replace obstacles, start and goal of the scenario.
+        every: Only worlds whose number is divisible by this number. 6 means the test
+            worlds of the BARN challenge.
+        only: Names of the worlds. Empty means all.
         out: New or empty directory. None means the next number under ``results``.
         workers: Number of processes. None means one process per processor core.
         resume: Whether ``out`` may contain runs of the same comparison. These runs are
@@ -276,6 +290,10 @@ def compare(
             remedy.
         RunError: Every run failed.
     """
+    chosen = []
+    if worlds is not None:
+        chosen = chosen_worlds(worlds, every, [*map(str, only)])
+    usual = (WORLD_SCENARIO,) if chosen else EXPERIMENTS
     plans = {
         Path(each).stem: comparison_plan(
             str(each),
@@ -284,8 +302,9 @@ def compare(
             seed=seed,
             settings=dict(settings or {}),
             grid=grid,
+            worlds=chosen,
         )
-        for each in scenarios or EXPERIMENTS
+        for each in scenarios or usual
     }
     if len(plans) < len(scenarios):
         raise InputError("scenarios", "a name is listed twice; remove one")

@@ -1,11 +1,16 @@
-"""Lists of what the package contains: its scenarios and its laws."""
+"""Lists of what the package contains: its scenarios, its laws, and its worlds."""
 
 from __future__ import annotations
 
 import html
 from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["Listing", "laws", "scenarios"]
+if TYPE_CHECKING:
+    from diagrams.scenario.worlds.world import World
+
+__all__ = ["Listing", "laws", "scenarios", "worlds"]
 
 
 class Listing(Mapping[str, str]):
@@ -53,3 +58,71 @@ def laws() -> Listing:
     from diagrams.scenario.fields.shipped import known_laws
 
     return Listing(known_laws())
+
+
+class Worlds(Listing):
+    """Worlds of a set by name, each with its obstacles, start, goal and path."""
+
+    def __init__(self, source: str, found: Mapping[str, World]) -> None:
+        super().__init__({name: _about(each) for name, each in found.items()})
+        self.source = source
+        """``shipped``, or the folder of the worlds."""
+        self._found = dict(found)
+
+    def document(self) -> dict[str, Any]:
+        """Returns the JSON document of the command ``worlds``."""
+        from analysis.report.provenance import SCHEMA_VERSION
+
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "source": self.source,
+            "count": len(self),
+            "worlds": [
+                {
+                    "name": name,
+                    "obstacles": len(each.obstacles),
+                    "start_m": [*each.start_m],
+                    "start_heading_deg": each.heading_deg,
+                    "goal_m": [*each.goal_m],
+                    "path_length_m": each.path_length_m,
+                }
+                for name, each in self._found.items()
+            ],
+        }
+
+    def __str__(self) -> str:
+        """Returns a heading, and one line per world."""
+        first = next(iter(self))
+        prefix, whose = f"{self.source}:", f"of {self.source}"
+        if self.source == "shipped":
+            prefix, whose = "", "that come with phonotaxis"
+        more = f"phonotaxis simulate barn --set world={prefix}{first} runs one"
+        return f"{len(self)} worlds {whose}\n{self!r}\n{more}"
+
+
+def _about(world: World) -> str:
+    (x, y), (goal_x, goal_y) = world.start_m, world.goal_m
+    length = world.path_length_m
+    return (
+        f"{len(world.obstacles)} obstacles, from ({x:g}, {y:g}) to "
+        f"({goal_x:g}, {goal_y:g}) m, "
+        + ("no path length" if length is None else f"path {length:.2f} m")
+    )
+
+
+def worlds(source: str | Path = "shipped") -> Worlds:
+    """Lists the worlds of a set (docs/worlds.md).
+
+    Args:
+        source: ``shipped`` for the worlds that come with phonotaxis, or a folder.
+
+    Returns:
+        The worlds by name.
+
+    Raises:
+        InputError: The folder has no worlds, or a file is not valid.
+    """
+    from diagrams.scenario.worlds.catalog import open_worlds
+
+    found = {name: read() for name, read in open_worlds(source).items()}
+    return Worlds(str(source), found)

@@ -304,7 +304,7 @@ def marginal(
         return Marginal(
             path,
             np.arange(len(names), dtype=float),
-            tuple(short(name) for name in names),
+            tuple(_label(path, name) for name in names),
             tuple(quantity.estimate(runs[values == name]) for name in names),
         )
     count = int(np.clip(len(runs) // USUAL_RUNS, LEAST_BINS, MOST_BINS))
@@ -327,6 +327,11 @@ def cell_label(fields: dict[str, Any]) -> str:
     """Returns a text about a cell, for example ``law active, speed_m_s 0.2``."""
     pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
     return ", ".join(pairs) or "all runs"
+
+
+def _label(path: str, value: Any) -> str:
+    """Returns a short text for a value; the name of a world without its set."""
+    return short(value.rpartition(":")[2] if path == "world" else value)
 
 
 def short(value: Any, most: int = 24) -> str:

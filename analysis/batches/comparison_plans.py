@@ -24,6 +24,8 @@ EXPERIMENTS = (
     "one_moving_obstacle",
     "two_moving_obstacles",
 )
+#: Scenario and laws of a comparison in worlds that names none.
+WORLD_SCENARIO, WORLD_LAWS = "barn", ("guarded", "dwa")
 _LIBRARY = Path(diagrams.__file__).parent / "layouts"
 #: Fields of a sweep file that a comparison sets itself. A file of layouts, which is a
 #: sweep file otherwise, must not contain them.
@@ -39,10 +41,11 @@ def comparison_plan(
     scenario: str,
     *,
     laws: Laws | None = None,
-    runs: int = 50,
+    runs: int | None = None,
     seed: int = 1,
     settings: dict[str, Any] | None = None,
     grid: Mapping[str, Sequence[Any]] | None = None,
+    worlds: Sequence[str] = (),
 ) -> SweepPlan:
     """Plans the runs that compare control laws on the layouts of one scenario.
 
@@ -56,11 +59,15 @@ def comparison_plan(
             its runs differ only in their random numbers.
         laws: Names of the laws, or functions and classes. ``all`` means every law for
             robots of this kind. None means the laws of the papers and driving without
-            avoidance. For a scenario with routes, None means the laws for routes.
-        runs: Number of layouts.
+            avoidance. For a scenario with routes, None means the laws for routes. In
+            worlds, None means ``guarded`` and ``dwa``.
+        runs: Number of layouts. In worlds, it is the number of runs in each world. None
+            means 50 layouts, or one run in each world.
         seed: Seed of the layouts and of the noise.
         settings: Values of other fields, by dotted path.
         grid: Lists of values of other fields to compare, by dotted path.
+        worlds: Worlds, as values for the field ``world``. Every law meets each of them.
+            They replace the obstacles, the start and the goal of the scenario.
 
     Returns:
         Plan of a paired sweep over the laws and over ``grid``.
@@ -72,7 +79,10 @@ def comparison_plan(
     base = scenario_from_mapping(plan.base)
     _require_one_law(base, plan.base)
     if laws is None:
-        laws = ROUTE_LAWS if is_routed(base) else FORCE_LAWS
+        ours = WORLD_LAWS if worlds else FORCE_LAWS
+        laws = ROUTE_LAWS if is_routed(base) else ours
+    if runs is None:
+        runs = 1 if worlds else 50
     for key, values in (grid or {}).items():
         if isinstance(values, str):  # it would become a list of its letters
             raise InputError(f"grid.{key}", f"is {values!r}; give a list of values")
@@ -82,10 +92,12 @@ def comparison_plan(
             "law": tuple(chosen_names(laws, base)),
             **{k: tuple(v) for k, v in (grid or {}).items()},
         },
-        "runs": runs,
+        "runs": runs * max(len(worlds), 1),
         "seed": seed,
         "pair": True,
     }
+    if worlds:
+        changed["draw"] = plan.draw | {"world": {"in_turn": tuple(worlds)}}
     return with_fields(plan, changed, "a comparison")
 
 
@@ -111,22 +123,24 @@ def comparison_plans(
     scenarios: Sequence[str] = (),
     *,
     laws: Laws | None = None,
-    runs: int = 50,
+    runs: int | None = None,
     seed: int = 1,
     settings: Iterable[str] = (),
     grid: Iterable[str] = (),
+    worlds: Sequence[str] = (),
 ) -> dict[str, SweepPlan]:
     """Makes the plans of ``phonotaxis compare`` from its command line.
 
     Args:
         scenarios: Scenarios, see ``comparison_plan``. If there are none, the result has
-            plans for the experiments of the papers.
+            plans for the experiments of the papers. In worlds, it has one for ``barn``.
         laws: Names of the laws, separated by commas.
-        runs: Number of layouts per scenario.
+        runs: Number of layouts per scenario, see ``comparison_plan``.
         seed: Seed of the layouts and of the noise.
         settings: Texts of the form ``key=value``. Several values of
             ``collision_vector.velocity_term``, separated by commas, are compared.
         grid: Texts of the form ``key=[value, ...]``.
+        worlds: See ``comparison_plan``.
 
     Returns:
         Plan of each scenario, by its name without folder and file ending.
@@ -137,7 +151,7 @@ def comparison_plans(
     fields, compared = split_settings(settings)
     varied = dict(_listed_values(text) for text in grid) | compared
     plans: dict[str, SweepPlan] = {}
-    for scenario in scenarios or EXPERIMENTS:
+    for scenario in scenarios or ((WORLD_SCENARIO,) if worlds else EXPERIMENTS):
         name = Path(scenario).stem
         if name in plans:
             raise InputError("scenario", f"{name} is listed twice; remove one")
@@ -148,6 +162,7 @@ def comparison_plans(
             seed=seed,
             settings=fields,
             grid=varied,
+            worlds=worlds,
         )
     return plans
 

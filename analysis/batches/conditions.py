@@ -59,7 +59,7 @@ class Conditions(Parameters):
                 )
 
     def _check_source(self, scenario: Scenario) -> None:
-        obstacles = [Body(each.path(), each.shape()) for each in scenario.obstacles]
+        obstacles = [Body(each.path(), each.shape()) for each in scenario.all_obstacles]
         if not self.source_distance_m or not obstacles:
             return
         from analysis.runs.proximity import least_clearances  # compiles code
@@ -81,7 +81,7 @@ class Conditions(Parameters):
             if least[nearest] < self.source_distance_m:
                 raise InputError(
                     "require.source_distance_m",
-                    f"{scenario.obstacles[nearest].name!r} comes within "
+                    f"{scenario.all_obstacles[nearest].name!r} comes within "
                     f"{max(least[nearest], 0.0):.3g} m of {name!r}, less than "
                     f"{self.source_distance_m:g} m; move one of them",
                 )

@@ -118,6 +118,9 @@ class Distribution(Parameters):
     likely."""
     choice: Values | None = None
     """List of values of any type. All values are equally likely."""
+    in_turn: Values | None = None
+    """List of values of any type. Run k gets value k modulo their number, so that all
+    values occur equally often."""
     boxes: Boxes | None = None
     """Random boxes at rest, for the field ``obstacles``."""
     sector: Sector | None = None
@@ -169,14 +172,18 @@ class Distribution(Parameters):
 
     @property
     def numeric(self) -> bool:
-        """Whether the distribution draws numbers; always false for ``choice``."""
-        return self.choice is None and self.boxes is None and self.sector is None
+        """Whether the distribution draws numbers; always false for lists of values."""
+        return self._given[0] in ("uniform", "log_uniform", "normal", "integers")
 
-    def draw(self, generator: np.random.Generator, count: int = 1) -> list[Any]:
-        """Draws one value, and returns the values that ``count`` fields get from it.
+    def draw(
+        self, generator: np.random.Generator, count: int = 1, run: int = 0
+    ) -> list[Any]:
+        """Draws one value for a run, and returns the values of ``count`` fields.
 
         All fields get the drawn value, unless ``each`` has one pair for each field.
         """
+        if self.in_turn is not None:
+            return [self.in_turn[run % len(self.in_turn)]] * count
         if self.boxes is not None:
             return [self.boxes.draw(generator)] * count
         if self.sector is not None:

@@ -25,13 +25,14 @@ from analysis.report.file_names import distinct_names
 from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.loading import (
     SCENARIO_FILE,
-    resolve_sound,
+    resolve_files,
     written_fields,
 )
 from diagrams.scenario.own_code import own_files
 from diagrams.scenario.own_objects import require_file, with_names
 from diagrams.scenario.scenario import Scenario, scenario_from_mapping
 from diagrams.scenario.settings import apply_settings, set_fields
+from diagrams.scenario.worlds.catalog import world_files
 from diagrams.scenario.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Line, Parameters
@@ -159,8 +160,8 @@ class SweepPlan(Parameters):
         """
         data = written_fields(self.source)
         _state_lists(data, scenario_from_mapping(data), self.set)
-        apply_settings(data, copy.deepcopy(self.set))
-        resolve_sound(data, Path(self.folder))
+        apply_settings(data, copy.deepcopy(self.set), Path(self.folder))
+        resolve_files(data, Path(self.folder))
         _state_lists(data, scenario_from_mapping(data), self.paths)
         return data
 
@@ -247,9 +248,9 @@ class SweepPlan(Parameters):
     def scenario_of(self, point: SweepPoint) -> Scenario:
         """Makes the scenario of a run."""
         data = pickle.loads(self._base_copy)
-        apply_settings(data, copy.deepcopy(point.fields))
+        apply_settings(data, copy.deepcopy(point.fields), Path(self.folder))
         data["seed"] = point.seed
-        resolve_sound(data, Path(self.folder))
+        resolve_files(data, Path(self.folder))
         return scenario_from_mapping(data)
 
     @property
@@ -275,6 +276,8 @@ class SweepPlan(Parameters):
         for field, text in self._all_texts({**self.base, **self.grid}):
             if field in ("file", "ego_noise_file"):
                 files.add(Path(self.folder, text).resolve())
+            elif field == "world" and text:
+                files.update(world_files(text, Path(self.folder)))
         return {
             str(path): hashlib.sha256(path.read_bytes()).hexdigest()
             for path in sorted(files)
@@ -355,14 +358,15 @@ class SweepPlan(Parameters):
     def _draws(self, entropy: list[int]) -> Iterator[tuple[str, Any]]:
         """Draws the values of all fields in ``draw``; yields paths and values.
 
-        The numbers in ``entropy`` are the seed. The draws of one key do not depend on
-        the other keys.
+        The numbers in ``entropy`` are the seed. The second one is the run. The draws of
+        one key do not depend on the other keys.
         """
         for key, distribution in self.draw.items():
             words = [*entropy, crc32(key.encode())]
             generator = np.random.Generator(np.random.Philox(seed=words))
             paths = _paths(key)
-            yield from zip(paths, distribution.draw(generator, len(paths)), strict=True)
+            drawn = distribution.draw(generator, len(paths), entropy[1])
+            yield from zip(paths, drawn, strict=True)
 
 
 def load_sweep(path: str | Path) -> SweepPlan:
@@ -400,8 +404,9 @@ def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
         for inner, item in value.items():
             for path in _paths(str(inner)):
                 known = path.split(".")[-1]
-                # The values of ``choice`` belong to the field that is drawn.
-                yield from _texts(key if known == "choice" else known, item)
+                # Listed values belong to the field that is drawn.
+                listed = known in ("choice", "in_turn")
+                yield from _texts(key if listed else known, item)
     elif isinstance(value, list | tuple):
         for item in value:
             yield from _texts(key, item)

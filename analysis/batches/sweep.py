@@ -143,7 +143,8 @@ def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
 
     Some faults appear only when a diagram is built, for example an unknown control law.
     The function builds the diagram of the first run. It also builds the diagram of
-    every run in which a field has a text or a mapping that no earlier run had.
+    every run in which a field has a text or a mapping that no earlier run had. A world
+    only has other obstacles, and needs no new diagram.
 
     Returns whether scenarios that do not choose an engine use the compiled engine. They
     do if the sweep has many runs and numba can compile the code of the user.
@@ -154,7 +155,7 @@ def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
         kinds = {
             json.dumps([path, value])
             for path, value in point.fields.items()
-            if type(value) in (str, dict)
+            if type(value) in (str, dict) and path != "world"
         }
         if point.index == 0 or not kinds <= seen:
             scenario = plan.scenario_of(point)

@@ -129,13 +129,14 @@ class MeasuredRun(Proximity):
         """Time from which P stays in the goal until the run ends, s.
 
         If the source is at rest, P must also be at rest from this time to the end of
-        the run, and this rest must last at least ``stop.rest_time_s``. The value is
-        None if there is no such time.
+        the run, and this rest must last at least ``stop.rest_time_s``. With a rest time
+        of 0, P need not be at rest. The value is None if there is no such time.
         """
         settled, least = self.in_goal, 0.0
-        if not self.result.target_moves:
+        rest_time_s = self.result.scenario.stop.rest_time_s
+        if not self.result.target_moves and rest_time_s > 0.0:
             settled = settled & (self._speed_of_P < REST_SPEED_M_S)
-            least = self.result.scenario.stop.rest_time_s - ROUNDING_S
+            least = rest_time_s - ROUNDING_S
         exits = np.flatnonzero(~settled)
         first = int(exits[-1]) + 1 if len(exits) else 0
         if first == len(settled) or self.time[-1] - self.time[first] < least:

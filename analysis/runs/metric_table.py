@@ -32,6 +32,7 @@ from analysis.runs.smoothness import (
     turn_reversals,
 )
 from diagrams.running.run_result import RunResult
+from diagrams.running.stop_rules import SUCCESSFUL
 from systems.framework.compiling import njit
 from systems.world.geometry import beyond_rectangle
 
@@ -49,6 +50,8 @@ ECHO_M = 0.2
 DRIVING_M_S = 0.02
 #: A speed of at least this part of the top speed counts as saturated.
 FULL = 0.999
+#: Speed of the optimal time of a world, m/s: the top speed in the BARN challenge.
+REFERENCE_SPEED_M_S = 2.0
 #: Sum of the arm lengths of two robots, m: of the listening robot and of the calling
 #: robot (Song 2011, 2.1, 3.1). At a smaller distance, the arms can touch.
 ARMS_M = 0.15 + 0.20
@@ -139,6 +142,10 @@ def _drives(run: MeasuredRun) -> bool:
 
 def _follows(run: MeasuredRun) -> bool:
     return not run.searches and not run.routed
+
+
+def _has_reference(run: MeasuredRun) -> bool:
+    return run.result.scenario.reference_path_m is not None
 
 
 def _finite(value: float) -> float | None:
@@ -439,6 +446,68 @@ _GOAL = (
         "the value is 0.",
         _spl,
         average="mean",
+    ),
+)
+
+
+def _score(run: MeasuredRun, least: float) -> float | None:
+    """Returns the score of the BARN challenge.
+
+    The score is the optimal time divided by the time to the goal. The time counts as at
+    least ``least`` and at most 8 times the optimal time.
+    """
+    path_m = run.result.scenario.reference_path_m
+    if path_m is None:
+        return None
+    time_s = _first_time(run, run.in_goal)
+    if run.result.cause not in SUCCESSFUL or time_s is None:
+        return 0.0
+    optimal_s = path_m / REFERENCE_SPEED_M_S
+    return optimal_s / float(np.clip(time_s, least * optimal_s, 8.0 * optimal_s))
+
+
+_WORLD = (
+    Metric(
+        "timeout_fraction",
+        "",
+        "share of time-outs",
+        "1 if the run ended neither at the goal nor by a contact, otherwise 0",
+        lambda run: float(run.result.cause not in (*SUCCESSFUL, "collision")),
+        average="mean",
+        shown="table",
+    ),
+    Metric(
+        "mean_time_s",
+        "s",
+        "mean time",
+        "`time_to_goal_s`, of which tables give the mean and not the median",
+        lambda run: _first_time(run, run.in_goal),
+        of="successes",
+        average="mean",
+        robots="greatest",
+        digits=1,
+        shown="table",
+    ),
+    Metric(
+        "score",
+        "",
+        "score",
+        "score of the BARN challenge: T/clip(`time_to_goal_s`, 2T, 8T), with "
+        "T = `reference_path_m` / (2 m/s); 0 without success. At most 0.5.",
+        lambda run: _score(run, 2.0),
+        average="mean",
+        paired=True,
+        shown="table",
+    ),
+    Metric(
+        "score_4",
+        "",
+        "score of earlier editions",
+        "score of the first BARN challenges: T/clip(`time_to_goal_s`, 4T, 8T). At most "
+        "0.25.",
+        lambda run: _score(run, 4.0),
+        average="mean",
+        shown="table",
     ),
 )
 _FOLLOWING = (
@@ -855,6 +924,7 @@ GROUPS = (
     Group("near", _drives, _NEAR),
     Group("contact", lambda run: _drives(run) and run.has("range_1"), _CONTACT),
     Group("goal", _drives, _GOAL),
+    Group("world", _has_reference, _WORLD),
     Group("following", _follows, _FOLLOWING),
     Group("route", lambda run: run.routed, _ROUTE),
     Group("stiffness", lambda run: run.routed and run.has("stiffness"), _STIFFNESS),

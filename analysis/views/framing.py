@@ -100,7 +100,7 @@ def _bounds(
     """Returns a rectangle around points and around the paths of other bodies."""
     paths: list[Path] = [each.path() for each in scenario.sources.values()]
     centers += [path.poses(times)[:, :2] for path in paths]
-    for each in scenario.obstacles:
+    for each in scenario.all_obstacles:
         poses, shape = each.path().poses(times), each.shape()
         if shape.centered:
             centers.append(poses[:, :2])

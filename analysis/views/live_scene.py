@@ -80,7 +80,7 @@ class LiveScene:
         paths = {name: each.path() for name, each in scenario.sources.items()}
         self._paths: dict[str, Path] = {
             **{name: path for name, path in paths.items() if path.moves},
-            **{o.name: o.path() for o in scenario.obstacles if o.path().moves},
+            **{o.name: o.path() for o in scenario.all_obstacles if o.path().moves},
         }
         self._bursts = {
             name: sound_bursts(sound, scenario.duration_s)
@@ -125,8 +125,12 @@ class LiveScene:
         poses = {name: values[port] for port, name in given.items() if port in values}
         if "obstacles.poses_WO" in values:
             rows = values["obstacles.poses_WO"].reshape(-1, 3)
-            names = [each.name for each in scenario.obstacles]
-            poses |= dict(zip(names, rows, strict=True))
+            begin = 0
+            for each in scenario.all_obstacles:
+                shape = each.shape()
+                if shape.centered:  # its rectangle has the pose of the body
+                    poses[each.name] = rows[begin]
+                begin += len(shape.rectangles)
         for name, path in self._paths.items():
             poses.setdefault(name, np.array(path.pose(time)))
         for name, robot in scenario.robots.items():

@@ -54,8 +54,9 @@ class LiveView(LeafSystem):
                 self.DeclareVectorInputPort(f"{name}.{port}", size)
         for name in scenario.sources:
             self.DeclareVectorInputPort(f"{name}.pose_WS", 3)
-        if scenario.obstacles:
-            size = 3 * len(scenario.obstacles)
+        if scenario.all_obstacles:
+            shapes = (each.shape() for each in scenario.all_obstacles)
+            size = 3 * sum(len(shape.rectangles) for shape in shapes)
             self.DeclareVectorInputPort("obstacles.poses_WO", size)
         period = scenario.tick_s * math.ceil(_PERIOD_S / scenario.tick_s - 1e-9)
         self.DeclareInitializationPublishEvent(self._start)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,16 @@ class Mesh(NamedTuple):
     """(3, n) points x, y, z, m."""
     faces: NDArray[np.int32]
     """(3, m) indices of the three points of each triangle."""
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Joins meshes to one mesh."""
+    begins = np.cumsum([0, *(mesh.vertices.shape[1] for mesh in meshes)])
+    faces = [mesh.faces + begin for mesh, begin in zip(meshes, begins, strict=False)]
+    return Mesh(
+        np.concatenate([mesh.vertices for mesh in meshes], axis=1),
+        np.concatenate(faces, axis=1).astype(np.int32),
+    )
 
 
 def ribbon(points: ArrayLike, z: float, width: float) -> Mesh:

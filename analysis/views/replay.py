@@ -28,7 +28,16 @@ from analysis.runs.known_space import known_space
 from analysis.views.curves import page_charts
 from analysis.views.floor_layers import clipped, floor_layers
 from analysis.views.framing import floor_rectangle, shown_rectangle
-from analysis.views.meshes import Mesh, arrow, circle, prism, rectangles, ribbon, star
+from analysis.views.meshes import (
+    Mesh,
+    arrow,
+    circle,
+    joined,
+    prism,
+    rectangles,
+    ribbon,
+    star,
+)
 from analysis.views.overlays import Arrow, Ball, Bar, Circle, Disc, Frame, overlays
 from analysis.views.plume_history import plume_history
 from analysis.views.replay_page import replay_page
@@ -365,8 +374,8 @@ class _Recorder:
                 return
         grown = shape.rectangles + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * more])
         outlines = [*shape.outlines, *map(rectangle_outline, grown if more else [])]
-        for number, outline in enumerate(outlines):
-            self.put(f"{path}/part_{number}", prism(outline, height), color)
+        parts = joined([prism(outline, height) for outline in outlines])
+        self.put(f"{path}/parts", parts, color)
 
     def _robot(self, thing: Thing, shape: RobotBody) -> None:
         """Adds a robot at the origin of its body frame B."""

@@ -264,7 +264,7 @@ def scene_bodies(
         poses = source.path().poses(times)
         label = _source_label(scenario, name, followed)
         found[name] = Thing(path, body, color, times, poses, name, label)
-    for each in scenario.obstacles:
+    for each in scenario.all_obstacles:
         poses = each.path().poses(times if each.path().moves else times[:1])
         label = "moving obstacle" if each.path().moves else "obstacle at rest"
         solid, path = Obstacle(each.shape(), BODY_HEIGHT_M), f"obstacles/{each.name}"
@@ -326,7 +326,7 @@ def _sources(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
 
 
 def _obstacles(scenario: Scenario, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
-    things = [bodies[each.name] for each in scenario.obstacles]
+    things = [bodies[each.name] for each in scenario.all_obstacles]
     if things:
         yield Layer("obstacles", "", (COLORS["obstacle"],), things, switched=False)
 

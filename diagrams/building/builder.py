@@ -135,7 +135,7 @@ def build_sound_follower(
         name: make_source(scenario, name, source, audible=name in audible)
         for name, source in scenario.sources.items()
     }
-    obstacles = Obstacles(obstacles=scenario.obstacles)
+    obstacles = Obstacles(obstacles=scenario.all_obstacles)
     followers = {
         name: robot_of(scenario, name, log=log, signals=driven.get(name))
         for name in scenario.robots
@@ -249,7 +249,7 @@ class _World:
         self._give(name, "emission", lambda: self._emission(target))
         for other in self.scenario.sounds():
             self._give(name, f"emission_{other}", lambda o=other: self._emission(o))
-        obstacles = len(self.scenario.obstacles)
+        obstacles = len(self.scenario.all_obstacles)
         others = dict([*around.obstacles.items()][obstacles:])
         poses = [self._pose(other) for other in others]
         shapes = [body.shape for body in others.values()]

@@ -175,9 +175,10 @@ def judge_tick(
         state[_AT.ticks] += 1.0
         if error <= stop.following_band_m:
             state[_AT.following] += 1.0
-    # Reached: P has rested in the goal of a target at rest for long enough.
+    # Reached: P has rested in the goal of a target at rest for long enough. If no rest
+    # is wanted, P may pass.
     there = numbers.source_rests and in_goal and valid
-    if there:
+    if there and stop.rest_time_s > 0.0:
         vx, vy = control_point_velocity(pose[2], velocity, numbers.control_point_m)
         there = math.hypot(vx, vy) < REST_SPEED_M_S
     state[_AT.rests] = min(state[_AT.rests], time) if there else math.inf

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from systems.base.robot import RobotParameters, microphones_B
 from systems.world.plane import beyond_rectangle, rectangle_clearance, rotate
 from systems.world.shapes import Shape, box
+
+#: Distance that is far above the rounding errors of distances, m.
+_ROUNDING_M = 1e-9
 
 
 class Path(Protocol):
@@ -76,8 +79,11 @@ class Body(NamedTuple):
         """
         if self.fills(point, time):
             return 0.0
-        rows = self.rectangles(time)
-        return min(math.hypot(*beyond_rectangle(point, row)) for row in rows)
+        return _least(
+            lambda row: math.hypot(*beyond_rectangle(point, row)),
+            self.rectangles(time),
+            (*point, 0.0),
+        )
 
     def clearance(self, rectangle: NDArray[np.float64], time: float) -> float:
         """Returns the clearance between the body and a (6,) rectangle in W, m.
@@ -87,7 +93,12 @@ class Body(NamedTuple):
         """
         if self.fills((rectangle[0], rectangle[1]), time):
             return -math.inf
-        return min(rectangle_clearance(rectangle, row) for row in self.rectangles(time))
+        x, y, _, length, width, radius = rectangle.tolist()
+        return _least(
+            lambda row: rectangle_clearance(rectangle, row),
+            self.rectangles(time),
+            (x, y, 0.5 * math.hypot(length, width) + radius),
+        )
 
     def fills(self, point: tuple[float, float], time: float) -> bool:
         """Returns whether a point in W is inside the polygon of the body.
@@ -99,6 +110,28 @@ class Body(NamedTuple):
         x, y, theta = self.path.pose(time)
         own = rotate(-theta, point[0] - x, point[1] - y)
         return bool(self.shape.fills(own))
+
+
+def _least(
+    distance: Callable[[NDArray[np.float64]], float],
+    rectangles: NDArray[np.float64],
+    circle: tuple[float, float, float],
+) -> float:
+    """Returns the least distance, m, between a body and one of many rectangles.
+
+    ``distance`` computes the distance from one rectangle. ``circle`` (x, y, radius), m,
+    encloses the body. A rectangle whose enclosing circle is too far away is skipped.
+    """
+    x, y, radius = circle
+    extents = np.hypot(rectangles[:, 3], rectangles[:, 4])
+    gaps = np.hypot(rectangles[:, 0] - x, rectangles[:, 1] - y)
+    gaps -= 0.5 * extents + rectangles[:, 5] + radius + _ROUNDING_M
+    least = math.inf
+    for k in np.argsort(gaps):
+        if gaps[k] > 0.0 and gaps[k] >= least:
+            break
+        least = min(least, distance(rectangles[k]))
+    return least
 
 
 @dataclass(frozen=True)

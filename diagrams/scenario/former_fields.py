@@ -2,7 +2,7 @@
 
 The file ``former_fields.tsv`` lists the fields of the previous version. For a renamed
 field, it states the new path. For a field that has become a constant, it states the
-value and the place of the constant.
+value and the place of the constant. For a field without any effect now, it states why.
 """
 
 from __future__ import annotations
@@ -40,11 +40,12 @@ _MISSING = object()
 class _Former(NamedTuple):
     path: str
     new: str
-    """New path; empty: the field is a constant now."""
+    """New path; empty: the field is a constant now, or has no effect."""
     value: Any
-    """Value of the constant."""
+    """Value of the constant; ``_MISSING``: the field has no effect, whatever its
+    value."""
     place: str
-    """File and name of the constant."""
+    """File and name of the constant, or why the field has no effect."""
 
 
 @cache
@@ -52,12 +53,12 @@ def former_fields() -> tuple[_Former, ...]:
     """The fields of the previous version that have a new name or are constants now."""
     with _TABLE.open(encoding="utf-8", newline="") as file:
         return tuple(
-            _Former(path, new, json.loads(value) if value else None, place)
+            _Former(path, new, json.loads(value) if value else _MISSING, place)
             for path, new, value, place in csv.reader(file, delimiter="\t")
         )
 
 
-def renewed(data: dict[str, Any]) -> dict[str, Any]:
+def renewed(data: dict[str, Any], law: Any = None) -> dict[str, Any]:
     """Replaces fields of the previous version, and prints a note for the user.
 
     The previous version saved all groups of fields for every kind of robot. If the data
@@ -66,6 +67,7 @@ def renewed(data: dict[str, Any]) -> dict[str, Any]:
 
     Args:
         data: Fields of a scenario, changed in place.
+        law: Law that will replace the law of all robots. None: the laws in the data.
 
     Returns:
         The same data.
@@ -76,8 +78,8 @@ def renewed(data: dict[str, Any]) -> dict[str, Any]:
     """
     notes: dict[str, None] = {}
     for where, fields in _robots_and_sources(data):
-        law = fields.get("law", data.get("law"))
-        notes |= dict.fromkeys(_renewed(where, fields, law))
+        own_law = law or fields.get("law", data.get("law"))
+        notes |= dict.fromkeys(_renewed(where, fields, own_law))
     if notes:
         _drop_groups_of_other_kinds(data)
         _LOGGER.warning("fields of the previous version: %s", "; ".join(notes))
@@ -104,19 +106,24 @@ def renamed(path: str) -> str:
 def is_constant_now(path: str, value: Any) -> bool:
     """Whether a field has become a constant with the value that a user has given.
 
-    The result is False if no constant has replaced the field at the dotted path
-    ``path``. If the constant has another value, the function raises an ``InputError``.
+    The result is also True if a former field has no effect any more. The result is
+    False if no constant has replaced the field at the dotted path ``path``. If the
+    constant has another value, the function raises an ``InputError``.
     """
     begin = _PREFIX.match(path)
     own = path[begin.end() :] if begin else path
     if own.startswith("repulsion."):
         own = f"laws.{own.removeprefix('repulsion.')}"
-    if not (constant := constant_now(own)):
+    former = next((each for each in former_fields() if each.path == own), None)
+    if former is None or former.new:
         return False
-    if value != next(each.value for each in former_fields() if each.path == own):
+    if former.value is _MISSING:
+        _LOGGER.warning("field of the previous version: %s", _without_effect(former))
+        return True
+    if value != former.value:
         raise InputError(
             path,
-            f"is {value!r}, but this is no longer a field; it is now {constant}; leave "
+            f"is {value!r}, but this is no longer a field; {constant_now(own)}; leave "
             "it out",
         )
     return True
@@ -126,11 +133,14 @@ def constant_now(path: str) -> str:
     """Returns the constant that has replaced a field of the previous version.
 
     ``path`` is the dotted path of the field. The result is the place and value of the
-    constant in words, or an empty text if no constant has replaced the field.
+    constant in words, or why the field has no effect. It is an empty text if the field
+    is no former field, or has a new name.
     """
     for former in former_fields():
         if former.path == path and not former.new:
-            return f"the constant {former.place} = {former.value!r}"
+            if former.value is _MISSING:
+                return f"it has no effect: {former.place}"
+            return f"it is now the constant {former.place} = {former.value!r}"
     return ""
 
 
@@ -157,22 +167,28 @@ def _renewed(where: str, fields: dict[str, Any], law: Any) -> Iterator[str]:
         value = _taken(fields, path.split("."))
         if value is _MISSING:
             continue
-        if former.new.startswith("guard.") and not _has_guard(fields):
+        if former.new.startswith("guard.") and not _has_guard(fields, law):
             yield f"{where}{path} has no effect without a guard"
         elif former.new.startswith("impedance.") and path.split(".")[1] != law:
             yield f"{where}{path} has no effect with law {law!r}"
         elif former.new:
             _put(fields, former.new.split("."), value)
             yield f"{where}{path} is now {former.new}"
+        elif former.value is _MISSING:
+            yield f"{where}{_without_effect(former)}"
         elif value != former.value:
             raise InputError(
                 f"{where}{path}",
-                f"is {value!r}, but this is no longer a field; it is now "
+                f"is {value!r}, but this is no longer a field; "
                 f"{constant_now(former.path)}; remove it",
             )
         else:
             yield f"{where}{path} is now a constant"
     yield from _renewed_faults(where, fields)
+
+
+def _without_effect(former: _Former) -> str:
+    return f"{former.path} has no effect: {former.place}"
 
 
 def _renew_safety_filter(fields: Mapping[str, Any]) -> None:
@@ -230,9 +246,9 @@ def _renewed_faults(where: str, fields: dict[str, Any]) -> Iterator[str]:
         yield f"{where}odometry.lost_at_s is now one of faults"
 
 
-def _has_guard(fields: Mapping[str, Any]) -> bool:
-    law = LAWS.get(str(fields.get("law")))
-    return fields.get("guard") is not None or (law is not None and law.guarded)
+def _has_guard(fields: Mapping[str, Any], law: Any) -> bool:
+    known = LAWS.get(str(law))
+    return fields.get("guard") is not None or (known is not None and known.guarded)
 
 
 def _fault(group: str, kind: str, fault: Any) -> Any:

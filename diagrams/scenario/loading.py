@@ -61,9 +61,9 @@ def load_scenario(
     if isinstance(source, Mapping):
         data = {"name": "scenario", **dict(plain_settings(source))}
     else:
-        data = written_fields(source)
+        data = written_fields(source, law=settings.get("law"))
     apply_settings(data, settings)
-    resolve_sound(data, Path.cwd())
+    resolve_files(data, Path.cwd())
     return scenario_from_mapping(data)
 
 
@@ -111,15 +111,17 @@ def scenario_text(source: str | Path) -> str:
     return path.read_text("utf-8")
 
 
-def written_fields(source: str | Path) -> dict[str, Any]:
+def written_fields(source: str | Path, *, law: Any = None) -> dict[str, Any]:
     """Reads the fields that the file of a scenario sets.
 
     Names of fields from the previous version are replaced by the present names. Paths
-    of sound files become absolute. If the file states no name of the scenario, the
+    of sound files and of the map become absolute. If the file states no name of the scenario, the
     function adds one.
 
     Args:
         source: A name from the library, or the path of a file.
+        law: Law that will replace the law of the file, on which the present names of
+            some fields depend. None: the law of the file.
 
     Returns:
         Plain values of the fields.
@@ -128,11 +130,14 @@ def written_fields(source: str | Path) -> dict[str, Any]:
         InputError: The name is unknown, or the file is unreadable.
     """
     from diagrams.scenario.former_fields import renewed
+    from diagrams.scenario.worlds.catalog import absolute
 
     path = _find(source)
-    data = renewed(read_mapping(path))
+    data = renewed(read_mapping(path), law)
     data.setdefault("name", path.stem)
-    resolve_sound(data, path.parent)
+    resolve_files(data, path.parent)
+    if data.get("world"):
+        data["world"] = absolute(data["world"], path.parent)
     return data
 
 
@@ -150,21 +155,25 @@ def write_scenario(
     beginning list the fields that differ from their defaults. Text editors use the
     schema to check and complete fields. With the copy, they find the schema even after
     the directory was moved. The folder ``own_code`` has the user's own laws and blocks.
+    The folder ``map`` has a copy of the map.
 
     Args:
         scenario: The scenario.
         directory: Existing directory.
         relative: Whether paths of sound files start in the directory. Otherwise, they
-            are absolute.
+            are absolute. The path of a map is always that of the copy.
     """
     from diagrams.scenario.differences import differences_text
+    from diagrams.scenario.map_parameters import copy_map
     from diagrams.scenario.own_sources import write_own_sources
 
     robots = scenario.robots.values()
     write_own_sources((name for own in robots for name in own.own_code), directory)
     data = scenario.model_dump(mode="json")
     if relative:
-        _change_sound(data, lambda file: os.path.relpath(file, directory))
+        _change_files(data, lambda file: os.path.relpath(file, directory))
+    if scenario.map is not None:
+        data["map"]["file"] = copy_map(scenario.map.file, directory)
     first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
     text = first + differences_text(scenario) + dump_yaml(data)
     (directory / SCENARIO_FILE).write_text(text, "utf-8")
@@ -250,19 +259,19 @@ def read_mapping(path: Path) -> dict[str, Any]:
     return data
 
 
-def resolve_sound(data: dict[str, Any], folder: Path) -> None:
-    """Makes relative paths of sound files absolute.
+def resolve_files(data: dict[str, Any], folder: Path) -> None:
+    """Makes relative paths of sound files and of the map absolute.
 
     Args:
         data: Fields of a scenario, changed in place.
         folder: Folder to which the relative paths refer: the folder of the scenario
             file, or the working directory.
     """
-    _change_sound(data, lambda file: str((folder / file).resolve()))
+    _change_files(data, lambda file: str((folder / file).resolve()))
 
 
-def _change_sound(data: dict[str, Any], change: Callable[[str], str]) -> None:
-    """Changes the paths of all sound files in the fields of a scenario."""
+def _change_files(data: dict[str, Any], change: Callable[[str], str]) -> None:
+    """Changes the paths of all sound files and of the map in a scenario."""
     for place in [
         data,
         *_participants(data, "robots").values(),
@@ -272,6 +281,7 @@ def _change_sound(data: dict[str, Any], change: Callable[[str], str]) -> None:
             ("microphones", "ego_noise_file"),
             ("sound", "file"),
             ("loudspeaker", "file"),
+            ("map", "file"),
         ):
             fields = place.get(group)
             if isinstance(fields, dict) and isinstance(fields.get(key), str):

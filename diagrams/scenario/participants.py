@@ -17,6 +17,7 @@ from pydantic import (
     SerializerFunctionWrapHandler,
     Strict,
     Tag,
+    ValidationError,
     create_model,
     field_validator,
     model_serializer,
@@ -50,6 +51,7 @@ from systems.ranging.parameters import (
     ObjectSensorParameters,
     UltrasonicParameters,
 )
+from systems.ranging.sensor_presets import on_body
 from systems.routes.parameters import RouteParameters
 from systems.safety.parameters import GuardParameters
 from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
@@ -201,10 +203,24 @@ class Robot(Parameters):
         return self.robot.length_m, self.robot.width_m
 
 
+def _place_sensors(data: Any) -> Any:
+    """Puts the sensors of a preset where the body of the robot has them."""
+    if not isinstance(data, Mapping) or not isinstance(data.get("ultrasonic"), Mapping):
+        return data
+    try:
+        body = RobotParameters.model_validate(data.get("robot", {}))
+    except (ValidationError, InputError):  # the validation of the robot reports it
+        return data
+    placed = on_body(data["ultrasonic"], body.length_m, body.control_point_m)
+    return {**data, "ultrasonic": placed}
+
+
 class Follower(Robot):
     """A robot that follows a sound and avoids obstacles."""
 
     kind: ClassVar[str] = "follower"
+
+    _place = model_validator(mode="before")(_place_sensors)
 
     hearing: Literal["audio", "ideal", "ideal_always"] = "audio"
     """``audio``: sound waves and microphones. ``ideal``: exact positions of the source
@@ -278,6 +294,8 @@ class Router(Robot):
     laws: LawGains = LawGains()
     """Gains by law. Only the gains of the robot's law have an effect."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
+
+    _place = model_validator(mode="before")(_place_sensors)
 
     @model_validator(mode="before")
     @classmethod

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict
 
+from diagrams.scenario.map_parameters import MapParameters
 from systems.framework.parameters import (
     Duration,
     Length,
@@ -14,6 +15,7 @@ from systems.framework.parameters import (
     Period,
     Size,
     SoundSpeed,
+    Time,
 )
 from systems.framework.signals import TICK_S
 from systems.odor.parameters import OdorParameters, WindParameters
@@ -35,9 +37,10 @@ class StopParameters(Parameters):
     goal_margin_m: Length = 0.3
     """Margin of the goal at a source at rest, m. P is in the goal if its distance from
     the source is at most the follow distance plus this margin."""
-    rest_time_s: Duration = 1.0
+    rest_time_s: Time = 1.0
     """Time for which P must be at rest in the goal without a break, s. After this time,
-    the run ends as reached."""
+    the run ends as reached. With 0, the run ends as soon as P is in the goal, at any
+    speed."""
     following_band_m: Length = 0.8
     """Greatest deviation from the follow distance, m. P follows if its distance from
     the source deviates from the follow distance by at most this value."""
@@ -73,10 +76,20 @@ class RunParameters(Parameters):
     """Longest simulated time, s; at most one hour."""
     arena_m: Size = (7.0, 7.0)
     """Extents of the floor in pictures, m; the arena has no walls."""
+    world: Line = ""
+    """World from a set of worlds: the name of a world that comes with phonotaxis, or
+    ``PATH:NAME`` (``phonotaxis worlds`` lists them). When the scenario is loaded, the
+    world becomes obstacles, start, goal, and ``reference_path_m``. Fields beside it
+    override those of the world."""
     obstacles: Annotated[
         tuple[ObstacleParameters, ...], Strict(False), Field(max_length=1_000)
     ] = ()
+    map: MapParameters | None = None
+    """Walls from a map file. null: there is no map."""
     stop: StopParameters = StopParameters()
+    reference_path_m: Length | None = None
+    """Length of a reference path from start to goal, m, for the metrics ``score`` and
+    ``score_4``. null: there are no scores."""
     sound_speed_m_s: SoundSpeed = SOUND_SPEED_M_S
     """Speed of sound, m/s (Han 2019, 2.1)."""
     room: RoomParameters | None = None

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from itertools import combinations
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
@@ -33,9 +34,11 @@ from diagrams.scenario.bodies import (
 )
 from diagrams.scenario.checks.goal_checks import check_filled_goals, check_goals
 from diagrams.scenario.checks.guard_checks import check_guard
+from diagrams.scenario.checks.map_checks import check_map
 from diagrams.scenario.checks.search_checks import check_searches
 from diagrams.scenario.fields.explain import explain
 from diagrams.scenario.fields.shipped import scenario_schema
+from diagrams.scenario.map_parameters import MapParameters
 from diagrams.scenario.participants import (
     AnyRobot,
     Follower,
@@ -57,11 +60,13 @@ from diagrams.scenario.shorthand import (
     file_form,
     resolved,
 )
+from diagrams.scenario.worlds.catalog import filled
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
 from systems.odor.parameters import CONTAINER_M
 from systems.sound.parameters import SoundParameters
+from systems.world.parameters import ObstacleParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
 from systems.world.shapes import box
@@ -103,7 +108,9 @@ class Scenario(RunParameters):
     @model_validator(mode="before")
     @classmethod
     def _resolve(cls, data: Any) -> Any:
-        return resolved(data) if isinstance(data, Mapping) else data
+        if not isinstance(data, Mapping):
+            return data
+        return resolved(filled(data, FilePath.cwd()))
 
     if not TYPE_CHECKING:  # a type checker would accept every name
 
@@ -204,6 +211,11 @@ class Scenario(RunParameters):
     def longest_frame_s(self) -> float:
         """Longest audio frame of all robots with microphones, s; 0 without any."""
         return max(map(frame_of, self.robots.values()))
+
+    @property
+    def all_obstacles(self) -> tuple[ObstacleParameters | MapParameters, ...]:
+        """The obstacles, and the map as the last one if there is a map."""
+        return self.obstacles if self.map is None else (*self.obstacles, self.map)
 
     @property
     def law_names(self) -> str:
@@ -330,7 +342,7 @@ class Scenario(RunParameters):
         """
         robot = robot or next(iter(self.robots))
         target, paths = self.target(robot), paths or {}
-        bodies = {o.name: Body(o.path(), o.shape()) for o in self.obstacles}
+        bodies = {o.name: Body(o.path(), o.shape()) for o in self.all_obstacles}
         for name, other in self.robots.items():
             if name != robot:
                 start = RecordedPath(np.zeros(1), np.array([other.start.pose]))
@@ -363,7 +375,7 @@ class Scenario(RunParameters):
         """(n, 6) rectangles of the known obstacles at rest, m and rad."""
         still = [
             Body(obstacle.path(), obstacle.shape()).rectangles(0.0)
-            for obstacle in self.obstacles
+            for obstacle in self.all_obstacles
             if obstacle.known and not obstacle.path().moves
         ]
         return np.concatenate([np.empty((0, 6)), *still])
@@ -413,11 +425,12 @@ class Scenario(RunParameters):
         faults = []
         for check in (
             lambda: check_goals(self.robots, self.stop.diverged_range_m),
-            lambda: check_filled_goals(self.robots, self.obstacles),
+            lambda: check_filled_goals(self.robots, self.all_obstacles),
             self._check_rates,
             self._check_step,
             self._check_room,
             self._check_start,
+            lambda: check_map(self.map, self.robots, self.sources, self.obstacles),
             self._check_guards,
         ):
             try:
@@ -438,7 +451,7 @@ class Scenario(RunParameters):
         taken += self.robots
         for field, names in (
             ("sources", self.sources),
-            ("obstacles", [obstacle.name for obstacle in self.obstacles]),
+            ("obstacles", [obstacle.name for obstacle in self.all_obstacles]),
         ):
             for name in names:
                 if name in taken:

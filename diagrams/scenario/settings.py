@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from diagrams.scenario.former_fields import is_constant_now, renamed
 from diagrams.scenario.shorthand import begins_anew, require_effect
+from diagrams.scenario.worlds.catalog import with_world
 from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
 
@@ -94,13 +96,19 @@ def _dotted(key: str) -> str:
     return re.sub(r"\[(\d+)\]", r".\1", key)
 
 
-def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:
+def apply_settings(
+    data: dict[str, Any], settings: Mapping[str, Any], folder: Path | None = None
+) -> None:
     """Sets fields of a scenario to the values that a user has given for them.
+
+    A world replaces the obstacles, the start and the goal. Other settings override the
+    world.
 
     Args:
         data: Fields of a scenario, changed in place.
         settings: Plain values, by dotted path of the field. Names from the previous
             version are possible.
+        folder: Folder to which the path of a world refers. None: the working directory.
 
     Raises:
         InputError: A path is invalid, see ``set_fields``.
@@ -112,6 +120,10 @@ def apply_settings(data: dict[str, Any], settings: Mapping[str, Any]) -> None:
         for key, value in settings.items()
         if not is_constant_now(key, value)
     }
+    if (world := fields.pop("world", None)) is not None:
+        new = with_world(data, world, folder or Path.cwd())
+        data.clear()
+        data.update(new)
     set_fields(data, fields.items())
     require_effect(data, fields)
 

@@ -32,6 +32,7 @@ from phonotaxis.commands import (
     simulate,
     stability,
     sweep,
+    worlds,
 )
 from phonotaxis.commands.carry_out import carry_out
 from phonotaxis.commands.command import Command
@@ -49,6 +50,7 @@ COMMANDS: dict[str, Command] = {
     for command in (
         simulate.COMMAND,
         lists.SCENARIOS,
+        worlds.COMMAND,
         lists.FIELDS,
         lists.LAWS,
         lists.RESULTS,

@@ -46,7 +46,27 @@ def _add_arguments(parser: ArgumentParser) -> None:
         default=[],
         help="compare values of a further field, for example hearing=[audio,ideal]",
     )
-    take_batch(parser, "layouts per scenario (default: 50)")
+    worlds = parser.add_argument(
+        "--worlds",
+        metavar="PATH",
+        nargs="?",
+        const="shipped",
+        help="compare in the worlds of this folder (docs/worlds.md); without PATH, in "
+        "the worlds that come with phonotaxis",
+    )
+    completed_by(worlds, "directory")
+    parser.add_argument(
+        "--every",
+        metavar="N",
+        type=int,
+        help="only worlds whose number is divisible by N; 6: the test worlds of BARN",
+    )
+    parser.add_argument(
+        "--only", metavar="WORLD,...", help="only these worlds, with commas"
+    )
+    take_batch(
+        parser, "layouts per scenario (default: 50), or runs per world (default: 1)"
+    )
     take_output(parser)
 
 
@@ -55,23 +75,42 @@ def _prepare(options: Namespace, take: Take) -> Prepared[ComparisonResult]:
     from analysis.batches.options import check_options
 
     check_options(options.out, workers=options.workers, resume=options.resume)
+    worlds = _worlds(options)
     plans = comparison_plans(
         options.scenario,
         laws=options.law or None,
-        runs=50 if options.runs is None else options.runs,
+        runs=options.runs,
         seed=whole_seed(options, 1),
         settings=settings_of(options),
         grid=options.grid,
+        worlds=worlds,
     )
     for plan in plans.values():
         plan.check()
-    say(f"comparing laws in {', '.join(plans)}")
+    places = f"{len(worlds)} worlds of {options.worlds}" if worlds else ", ".join(plans)
+    say(f"comparing laws in {places}")
 
     from phonotaxis.batches import prepare_compare
 
     return prepare_compare(
         plans, options.out, workers=options.workers, resume=options.resume
     )
+
+
+def _worlds(options: Namespace) -> list[str]:
+    from diagrams.scenario.worlds.catalog import chosen_worlds
+    from systems.framework.input_error import InputError
+
+    if options.worlds is None:
+        for name in ("every", "only"):
+            if (value := getattr(options, name)) is not None:
+                raise InputError(
+                    name, f"selects worlds; write --worlds PATH --{name} {value}"
+                )
+        return []
+    only = [name.strip() for name in (options.only or "").split(",") if name.strip()]
+    every = 1 if options.every is None else options.every
+    return chosen_worlds(options.worlds, every, only)
 
 
 COMMAND = Command(
@@ -83,6 +122,7 @@ COMMAND = Command(
     examples=(
         "compare two_static_obstacles --laws conventional,active --runs 20",
         "compare --set hearing=ideal --velocity-term printed,closing",
+        "compare --worlds --laws guarded,dwa --set robot.top_speed_m_s=0.5",
         "compare u_trap clutter --laws guarded,dwa,orca --out results/laws",
     ),
 )

@@ -6,7 +6,12 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 RobotPreset = Literal[
-    "han2019", "turtlebot3_burger", "song2011_olfactory", "song2011_hearing"
+    "han2019",
+    "turtlebot3_burger",
+    "jackal",
+    "p3dx",
+    "song2011_olfactory",
+    "song2011_hearing",
 ]
 
 _SONG: Mapping[str, Any] = {
@@ -36,6 +41,32 @@ ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
         "wheel_separation_m": 0.16,
         "mass_kg": 1.0,
         "top_speed_m_s": 0.22,
+    },
+    # Clearpath Jackal: 508 x 430 mm, 17 kg, 2 m/s. Wheels and track are those of its
+    # public ROS description (jackal_description). P is half a wheel separation ahead of
+    # the axle. The microphone positions are our choice.
+    "jackal": {
+        "length_m": 0.508,
+        "width_m": 0.430,
+        "control_point_m": 0.188,
+        "microphones_m": ((0.0, 0.2), (0.0, 0.0), (0.0, -0.2)),
+        "wheel_radius_m": 0.098,
+        "wheel_separation_m": 0.376,
+        "mass_kg": 17.0,
+        "top_speed_m_s": 2.0,
+    },
+    # Pioneer 3-DX: 455 x 381 mm, 9 kg, wheels of 195 mm diameter, 1.2 m/s (data sheet),
+    # wheels 331 mm apart (models of simulators). P is half a wheel separation ahead of
+    # the axle. The microphone positions are our choice.
+    "p3dx": {
+        "length_m": 0.455,
+        "width_m": 0.381,
+        "control_point_m": 0.1655,
+        "microphones_m": ((0.0, 0.15), (0.0, 0.0), (0.0, -0.15)),
+        "wheel_radius_m": 0.0975,
+        "wheel_separation_m": 0.331,
+        "mass_kg": 9.0,
+        "top_speed_m_s": 1.2,
     },
     # Song 2011 prints neither size nor track. Both are our choice. P is only 1 cm
     # ahead of the axle, because no law steers by it. The olfactory robot does not use

@@ -15,7 +15,6 @@ from systems.framework.block import Block_, Port, RunFacts, Step
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.sound.parameters import SoundParameters
-from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 from systems.world.geometry import control_point, rotate, safe_norm
 
 
@@ -77,11 +76,10 @@ def ideal_source_step(
     frame = tick // numbers.frame_ticks
     pose_WB, pose_WS = inputs
     x, y = relative_position(pose_WB, pose_WS, numbers.control_point_m)
-    heard = numbers.sounds[frame] and safe_norm(x, y) <= MAXIMUM_RANGE_M
     # Sums, because AutoDiffXd elements accept no float.
     nothing = 0.0 * state[2]
     state[0], state[1], state[2] = nothing, nothing, nothing
-    if heard:
+    if numbers.sounds[frame]:
         state[0], state[1], state[2] = x, y, nothing + 1.0
 
 
@@ -107,7 +105,7 @@ def IdealSourceSensor_(T):
         source relative to the control point P, and ``detected``. The block updates the
         state every audio frame. Its latency is one control period, like that of the
         estimator, so that the control loop is the same with either block. The block
-        detects the source at distances up to 30 m. Unlike the estimator with a row of
+        detects the source at any distance. Unlike the estimator with a row of
         microphones, the block distinguishes front from back.
 
         Args:

@@ -85,8 +85,8 @@ class UltrasonicParameters(Parameters):
     )
 
     preset: SensorPreset = "three"
-    """Named set of sensors. It gives the values of all other fields that are not
-    set."""
+    """Named set of sensors. It gives the values of all other fields that are not set.
+    The positions are those on the body of the robot."""
     sensors: Annotated[tuple[RangeSensorParameters, ...], Strict(False)] = _THREE
     """List of the sensors, from left to right.
 

@@ -23,7 +23,7 @@ from systems.safety.free_space import (
     move_window,
     see,
 )
-from systems.safety.parameters import START_BUBBLE_M, GuardParameters
+from systems.safety.parameters import GuardParameters
 from systems.safety.views import (
     PlaceError,
     Sectors,
@@ -165,7 +165,7 @@ class FreeSpaceMap(Block):
     count whole pulses, and the travel of each wheel has the relative error
     ``wheel_error``.
 
-    At the start, a disc around the axle with the radius ``START_BUBBLE_M`` counts as
+    At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
     free. The disc that contains the body always counts as free, because ``MotionGuard``
     keeps it free.
 
@@ -229,7 +229,7 @@ class FreeSpaceMap(Block):
             place_error,
             least_way,
             body_radius(robot),
-            START_BUBBLE_M,
+            parameters.start_bubble_m,
             tick_s,
             sensors.round_ticks(tick_s),
         )

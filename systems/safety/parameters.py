@@ -11,6 +11,7 @@ from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Acceleration,
     Fraction,
+    Length,
     NonNegativeLength,
     NonNegativeSpeed,
     Parameters,
@@ -24,8 +25,7 @@ MARGIN_M = 0.006
 LEAST_MARGIN_M = 0.003
 #: Side of the square that the map remembers, m. The square moves along with the robot.
 WINDOW_M = 12.8
-#: Radius of the start bubble, the disc around the axle that counts as free at the
-#: start, m.
+#: Default of ``GuardParameters.start_bubble_m``, m.
 START_BUBBLE_M = 1.0
 
 
@@ -48,6 +48,10 @@ class GuardParameters(Parameters):
     ``wheel_error`` cause this error. The guard keeps this distance, and 6 mm more,
     between the disc around the body and non-free space."""
 
+    start_bubble_m: Length = START_BUBBLE_M
+    """Radius of the start bubble, the disc around the axle that counts as free at the
+    start, m. Nothing else may be in this disc at the start."""
+
     @property
     def cells(self) -> int:
         """Number of cells along a side of the map."""
@@ -60,11 +64,12 @@ class GuardParameters(Parameters):
         at the start. If it is too small, the function raises an ``InputError``.
         """
         radius = body_radius(robot)
-        if radius + 2.0 * self.cell_m > START_BUBBLE_M:
+        least = radius + 2.0 * self.cell_m
+        if least > self.start_bubble_m:
             raise InputError(
-                "guard",
-                f"assumes that a disc of {START_BUBBLE_M:g} m around the axle is free "
-                f"at the start, but the body turns within {radius:.3g} m, and two "
-                f"cells of {self.cell_m:g} m do not fit beside it; leave guard out, or "
-                "lower guard.cell_m or the size of the body",
+                "guard.start_bubble_m",
+                f"is {self.start_bubble_m:g} m, but the body turns within "
+                f"{radius:.3g} m, and two cells of {self.cell_m:g} m do not fit beside "
+                f"it; give at least {math.ceil(1e3 * least) / 1e3:g}, lower "
+                "guard.cell_m, or leave guard out",
             )

@@ -24,7 +24,8 @@ def Obstacles_(T):
         The block has no state and no latency.
 
         Args:
-            obstacles: A sequence of ``ObstacleParameters``.
+            obstacles: A sequence of ``ObstacleParameters``, or of other objects with
+                the methods ``path`` and ``shape``.
         """
 
         part, stage = "obstacles", "world"
@@ -43,37 +44,35 @@ def Obstacles_(T):
             super().__init__(converter=converter)
             self.set_name("obstacles")
             self._bodies = [(each.path(), each.shape()) for each in obstacles]
-            rectangles = [row for _, shape in self._bodies for row in shape.rectangles]
-            self._sizes = [extent for row in rectangles for extent in row[3:]]
+            sizes = [shape.rectangles[:, 3:] for _, shape in self._bodies]
+            self._sizes = _flat(sizes)
             moving = any(path.moves for path, _ in self._bodies)
             ticket = self.time_ticket() if moving else self.nothing_ticket()
-            self.declare_ports(sizes={"rectangles": len(rectangles)})
+            self.declare_ports(sizes={"rectangles": len(self._sizes) // 3})
             self.declare_output("poses_WO", self._poses, {ticket})
             self.declare_output("velocities_WO", self._velocities, {ticket})
             self.declare_output("sizes", self._extents, {self.nothing_ticket()})
 
         def _poses(self, context, output):
             time = seconds(context)
-            rows: list[Any] = []
-            for path, shape in self._bodies:
-                pose = path.pose(time)
-                rows += [pose] if shape.centered else [*shape.at(pose)[:, :3]]
-            output.SetFromVector(_flat(rows))
+            poses = [shape.at(path.pose(time))[:, :3] for path, shape in self._bodies]
+            output.SetFromVector(_flat(poses))
 
         def _velocities(self, context, output):
             time = seconds(context)
-            rows: list[Any] = []
+            velocities = []
             for path, shape in self._bodies:
                 vx, vy, omega = path.velocity(time)
                 x, y, _ = pose = path.pose(time)
-                rows += [
-                    (vx - omega * (row[1] - y), vy + omega * (row[0] - x), omega)
-                    for row in shape.at(pose)
-                ]
-            output.SetFromVector(_flat(rows))
+                rows = shape.at(pose)
+                found = np.full((len(rows), 3), omega)
+                found[:, 0] = vx - omega * (rows[:, 1] - y)
+                found[:, 1] = vy + omega * (rows[:, 0] - x)
+                velocities.append(found)
+            output.SetFromVector(_flat(velocities))
 
         def _extents(self, context, output):
-            output.SetFromVector(np.array(self._sizes, dtype=float))
+            output.SetFromVector(self._sizes)
 
     return Impl
 
@@ -81,5 +80,6 @@ def Obstacles_(T):
 Obstacles = Obstacles_[None]
 
 
-def _flat(rows) -> np.ndarray:
-    return np.array([value for row in rows for value in row], dtype=float)
+def _flat(tables: Sequence[np.ndarray]) -> np.ndarray:
+    """Joins tables with three numbers per rectangle, row by row."""
+    return np.concatenate([np.empty(0), *(table.ravel() for table in tables)])

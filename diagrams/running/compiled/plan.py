@@ -149,10 +149,9 @@ class LoopPlan:
         for port, bodies in wanted.items():
             if ("", port) in values:
                 into = values["", port]
-                known = [body for name, body in bodies.items() if name not in robots]
-                moves = any(body.path.moves for body in known)
-                places: list[int] = []
-                at, tables, begin = times if moves else times[:1], [], 0
+                # Poses of bodies at rest, and of bodies that move.
+                places: tuple[list[int], list[int]] = ([], [])
+                tables, begin = ([], []), 0
                 for other, body in bodies.items():
                     # A body has one pose in the port per rectangle.
                     end = begin + 3 * len(body.shape.rectangles)
@@ -160,11 +159,16 @@ class LoopPlan:
                         pose = robots[other].values["plant", "pose_WB"]
                         self._fill_by(copy, into, begin, pose)
                     else:
-                        places += range(begin, end, 3)
-                        tables.append(body.rectangles_over(at)[..., :3])
+                        moves = body.path.moves
+                        at = times if moves else times[:1]
+                        places[moves].extend(range(begin, end, 3))
+                        tables[moves].append(body.rectangles_over(at)[..., :3])
                     begin = end
-                poses = np.concatenate([np.empty((0, len(at), 3)), *tables])
-                self._fill_by(fill, into, np.array(places, dtype=np.int64), poses)
+                for numbers, known in zip(places, tables, strict=True):
+                    if known:
+                        poses = np.concatenate(known)
+                        rows = np.array(numbers, dtype=np.int64)
+                        self._fill_by(fill, into, rows, poses)
         if ("", "sizes") in values:
             sizes = [body.shape.rectangles[:, 3:] for body in around.obstacles.values()]
             values["", "sizes"][:] = np.concatenate([np.empty((0, 3)), *sizes]).ravel()

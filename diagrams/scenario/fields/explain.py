@@ -127,7 +127,7 @@ def _unknown(
             f"the laws {', '.join(laws)}"
         )
     if constant := constant_now(".".join(loc[3:] if loc[0] == "robots" else loc)):
-        return f"is no longer a field; it is now {constant}; remove it"
+        return f"is no longer a field; {constant}; remove it"
     if near := near_field(schema, place):
         return f"did you mean {near!r}? {'.'.join(place)!r} is not a field of {what}"
     if place[-2:-1] == ["laws"]:

@@ -19,7 +19,7 @@ from systems.base.robot import body_radius
 from systems.base.tyre_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError, shortened
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M, START_BUBBLE_M
+from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M
 from systems.safety.views import (
     RANGE_MARGIN_M,
     PlaceError,
@@ -263,9 +263,8 @@ def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
     place = scenario.only.start.position_m
     nearest = min((body.distance(place, 0.0) for body in bodies), default=math.inf)
     field, text = "start.position_m", "nearest body at the start"
-    return Assumption(
-        "A3", text, nearest, START_BUBBLE_M, "m", at_least=True, field=field
-    )
+    bubble = scenario.follower.own_map.start_bubble_m
+    return Assumption("A3", text, nearest, bubble, "m", at_least=True, field=field)
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:

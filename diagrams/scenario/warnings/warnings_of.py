@@ -61,7 +61,7 @@ def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
     """(n, 6) rectangles in W of the obstacles at rest, by name."""
     return {
         each.name: Body(each.path(), each.shape()).rectangles(0.0)
-        for each in scenario.obstacles
+        for each in scenario.all_obstacles
         if not each.path().moves
     }
 

@@ -207,6 +207,29 @@ def test_time_to_the_goal_and_settling():
     assert away["settling_time_s"] is None
 
 
+@pytest.mark.parametrize(
+    ("path_m", "cause", "score", "score_4"),
+    [
+        # The goal is reached after 2 s. The optimal time is the path at 2 m/s.
+        (8.0, "reached", 0.5, 0.25),  # 2 s count as 8 s, or 16 s: 4 s / 8 s
+        (1.0, "reached", 0.25, 0.25),  # 0.5 s / 2 s
+        (0.6, "reached", 0.15, 0.15),  # 0.3 s / 2 s
+        (0.2, "reached", 0.125, 0.125),  # 2 s count as 0.8 s
+        (1.0, "collision", 0.0, 0.0),
+        (1.0, "stuck", 0.0, 0.0),
+    ],
+)
+def test_scores_in_a_world(path_m, cause, score, score_4):
+    x = np.arange(0.0, 2.2, TICK)
+    fields = {"source": RESTING, "reference_path_m": path_m}
+    metrics = run_metrics(motion(x, 0 * x, 0 * x, cause=cause, **fields))
+    assert metrics["mean_time_s"] == pytest.approx(2.0, abs=TICK)
+    assert metrics["score"] == pytest.approx(score, rel=0.02)
+    assert metrics["score_4"] == pytest.approx(score_4, rel=0.02)
+    assert metrics["timeout_fraction"] == (cause == "stuck")
+    assert "score" not in run_metrics(straight(source=RESTING))
+
+
 def test_turning_on_the_spot_is_not_settled():
     """P, 0.175 m ahead of the center, goes 0.07 m/s at 0.4 rad/s, 0.035 at 0.2."""
     still = np.full(161, 2.4)

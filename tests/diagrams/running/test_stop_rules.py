@@ -94,6 +94,15 @@ def test_flying_by_is_not_reaching():
     assert distances.max() > 1.5
 
 
+def test_without_a_rest_time_flying_by_is_reaching():
+    """The same run ends at its first tick in the goal, at 0.5 m/s."""
+    result = run(duration_s=12.0, stop={"rest_time_s": 0.0})
+    distances = result.columns["source_range_true"]
+    assert result.cause == "reached"
+    assert distances[-1] <= 1.5 < distances[-2]
+    assert speed_of_P(result)[-1] > 0.5
+
+
 def test_turning_on_the_spot_is_no_rest():
     """The center stands still at first, but P, ahead of it, sweeps round."""
     beside = {"waypoints_m": [[0.175, 1.3]]}

@@ -105,3 +105,29 @@ def test_shorthand_that_all_robots_override_is_refused():
         load_scenario("convoy", {"start.position_m": [1.0, 1.0]})
     turned = load_scenario("convoy", {"start.heading_deg": 5.0})
     assert {each.start.heading_deg for each in turned.robots.values()} == {5.0}
+
+
+FAR = """
+law: guarded
+hearing: ideal
+ideal_hearing: {burst_gaps: false, maximum_range_m: 200.0}
+following: {cruise_speed_m_s: 0.8}
+free_space: {start_bubble_m: 0.7}
+"""
+
+
+def test_a_limit_without_effect_is_named_and_left_out(tmp_path, caplog):
+    file = tmp_path / "old.yaml"
+    file.write_text(FAR, "utf-8")
+    robot = load_scenario(file).follower
+    assert robot.guard is not None
+    assert (robot.hearing, robot.guard.start_bubble_m) == ("ideal_always", 0.7)
+    assert "maximum_range_m has no effect: ideal hearing has no" in caplog.text
+    field = "ideal_hearing.maximum_range_m"
+    assert load_scenario("default", {field: 50.0}) == load_scenario("default")
+
+
+def test_the_map_of_a_law_that_is_replaced_makes_no_guard(tmp_path):
+    file = tmp_path / "old.yaml"
+    file.write_text(FAR, "utf-8")
+    assert load_scenario(file, law="dwa").follower.guard is None

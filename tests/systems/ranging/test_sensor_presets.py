@@ -79,6 +79,47 @@ def test_three_of_six_look_back_from_the_rear_edge():
     assert (six.axes_deg[:3], six.places[:3]) == ((30.0, 0.0, -30.0), ((0.0, 0.0),) * 3)
 
 
+@pytest.mark.parametrize(
+    ("robot", "mast", "rear"),
+    [
+        # Axle and rear edge from P: -eps and -eps - length/2, from the data sheets.
+        ("han2019", -0.175, -0.350),
+        ("turtlebot3_burger", -0.080, -0.149),
+        ("jackal", -0.188, -0.442),
+        ("p3dx", -0.1655, -0.393),
+    ],
+)
+def test_sensors_stand_where_the_body_of_each_robot_allows(robot, mast, rear):
+    for name in (*RINGS, "lidar_270"):
+        words = [f"robot.preset={robot}", f"ultrasonic.preset={name}"]
+        loaded = load_scenario("default", words)
+        assert set(loaded.follower.ultrasonic.places) == {(mast, 0.0)}
+        again = loaded.with_({"seed": 2})
+        assert again.follower.ultrasonic == loaded.follower.ultrasonic
+    words = [f"robot.preset={robot}", "ultrasonic.preset=six"]
+    fourth = "ultrasonic.sensors={3: {position_m: [-0.1, 0.0]}, 4: {noise_m: 0.02}}"
+    ahead, behind = load_scenario("default", words), [*words, fourth]
+    assert ahead.follower.ultrasonic.places[:3] == ((0.0, 0.0),) * 3
+    places = np.array(ahead.follower.ultrasonic.places[3:])
+    np.testing.assert_allclose(places, [[rear, 0.0]] * 3, atol=1e-12)
+    changed = load_scenario("default", behind).follower.ultrasonic
+    np.testing.assert_allclose(changed.places[3:], [[-0.1, 0], [rear, 0], [rear, 0]])
+    assert changed.sensors[4].noise_m == 0.02
+
+
+def test_a_given_position_wins_over_the_mast():
+    words = ["robot.preset=jackal", "ultrasonic.preset=lidar"]
+    given = load_scenario("default", [*words, "ultrasonic.position_m=[-0.05, 0.0]"])
+    assert set(given.follower.ultrasonic.places) == {(-0.05, 0.0)}
+
+
+def test_a_scanner_sees_270_deg_ahead_without_gaps():
+    scan = sensors("lidar_270")
+    np.testing.assert_allclose(np.diff(scan.axes_deg), -2.0 * 1.25)
+    assert scan.axes_deg[0] + 1.25 == -(scan.axes_deg[-1] - 1.25) == 135.0
+    assert (scan.count, scan.maximum_range_m, scan.noise_m) == (108, 10.0, 0.01)
+
+
 def test_a_lidar_is_farther_and_noisier():
     lidar = sensors("lidar")
     assert (lidar.maximum_range_m, lidar.noise_m) == (5.0, 0.01)

@@ -140,7 +140,7 @@ def test_a_ring_runs(firing):
         ({"sensors": [{"axis": 1.0}]}, r"sensors\.0\.axis"),
         ({"noise_m": -1.0}, "noise_m: is -1.0; input should be greater"),
         ({"axes_deg": (10.0, -10.0), "positions_m": ((0, 0),) * 3}, "3 positions for"),
-        ({"preset": "five"}, "'ring_8', 'ring_12', 'lidar' or 'scan_7'"),
+        ({"preset": "five"}, "'ring_8', 'ring_12', 'lidar', 'lidar_270' or 'scan_7'"),
         ({"preset": ["six"]}, "'three', 'six'"),
     ],
 )

@@ -126,14 +126,14 @@ def test_a_body_that_is_too_large_for_the_bubble_is_refused():
     """The corners of a body 1.85 m wide are more than 0.92 m from the axle."""
     with pytest.raises(InputError, match="two cells") as error:
         FreeSpaceMap(robot=RobotParameters(width_m=1.85))
-    assert error.value.field == "guard"
+    assert error.value.field == "guard.start_bubble_m"
 
 
 @pytest.mark.parametrize(
     ("overrides", "field"),
     [
         (["obstacle_sensing=ideal"], "obstacle_sensing"),
-        (["robot.width_m=1.85"], "guard"),
+        (["robot.width_m=1.85"], "guard.start_bubble_m"),
         (
             ["ultrasonic.sensors=[{axis_deg: 60}, {axis_deg: -60}]"],
             "ultrasonic.sensors",

@@ -1,0 +1,1 @@
+"""Worlds: obstacles with a start and a goal, from the files of public benchmarks."""
