@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.world.geometry import beyond, corners_of
 
+#: Margin of lengths, m, and of angles, rad, that exceeds all rounding errors.
+_MARGIN = 1e-6
+
 
 @njit(cache=True)
 def _nearest_on_segment(
@@ -244,9 +247,18 @@ def fan_ranges(
         end = _fan_end(begin, axes, places, half_angles)
         ahead, left = control_point_m + places[begin, 0], places[begin, 1]
         at = x + c * ahead - s * left, y + s * ahead + c * left
-        fan = begin, end, axes, theta, half_angles[begin], cosines, sines
+        fan = begin, end, axes, theta, cosines, sines
+        cone = math.tan(half_angles[begin]), half_angles[begin]
         for k in range(rectangles.shape[0]):
-            _see_rectangle(ranges, at, fan, rectangles[k], reach_m)
+            # The circle around the rectangle, enlarged by a margin for rounding errors.
+            length, width = rectangles[k, 3], rectangles[k, 4]
+            outer = 0.5 * math.sqrt(length * length + width * width)
+            outer += rectangles[k, 5] + _MARGIN
+            dx, dy = rectangles[k, 0] - at[0], rectangles[k, 1] - at[1]
+            squared, far = dx * dx + dy * dy, reach_m + outer
+            if squared <= far * far:
+                circle = math.atan2(dy, dx), math.sqrt(squared), outer
+                _see_rectangle(ranges, at, fan, cone, rectangles[k], circle)
         begin = end
     return ranges
 
@@ -272,30 +284,25 @@ def _fan_end(
     return end
 
 
-@njit(cache=True)
+@register_jitable
 def _see_rectangle(
     ranges: NDArray[np.float64],
     at: tuple[float, float],
     fan: Any,
+    cone: tuple[float, float],
     rectangle: NDArray[np.float64],
-    reach_m: float,
-) -> None:  # pragma: no cover  (compiled)
+    circle: tuple[float, float, float],
+) -> None:
     """Reduces the ranges of the sensors of a fan at ``at`` that see a rectangle.
 
-    The margins of distances (1e-6 m) and angles (1e-6 rad) exceed all rounding errors,
-    so that the function skips only what cannot change a range.
+    ``cone`` has the tangent of half of the opening angle, and half of the opening
+    angle, rad. ``circle`` is the circle around the rectangle: direction of its center in W, rad,
+    distance of its center from the fan, m, and radius, m.
     """
-    begin, end, axes, theta, half_angle, cosines, sines = fan
-    dx, dy = rectangle[0] - at[0], rectangle[1] - at[1]
-    # The circle around the rectangle.
-    length, width = rectangle[3], rectangle[4]
-    outer = 0.5 * math.sqrt(length * length + width * width) + rectangle[5] + 1e-6
-    squared, far = dx * dx + dy * dy, reach_m + outer
-    if squared > far * far:
-        return
-    distance = math.sqrt(squared)
+    begin, end, axes, theta, cosines, sines = fan
+    slope, half_angle = cone
+    bearing, distance, outer = circle
     corners = _corners_from(rectangle, at[0], at[1])
-    slope = math.tan(half_angle)
     if distance <= outer:
         inside = _is_inside(corners, rectangle, at[0], at[1])
         for k in range(begin, end):
@@ -310,9 +317,9 @@ def _see_rectangle(
     # sensor. The middle of the rectangle is at ``off``, from -pi to pi.
     middle, way = 0.5 * (axes[begin] + axes[end - 1]), axes[end - 1] - axes[begin]
     sense = -1.0 if way < 0.0 else 1.0
-    off = sense * (math.atan2(dy, dx) - theta - middle)
+    off = sense * (bearing - theta - middle)
     off -= math.tau * math.floor(off / math.tau + 0.5)
-    half = math.asin(outer / distance) + half_angle + 1e-6
+    half = math.asin(outer / distance) + half_angle + _MARGIN
     pitch = max(abs(way) / max(end - begin - 1, 1), 1e-6)
     for turn in (-math.tau, 0.0, math.tau):
         low, high = off + turn - half, off + turn + half
