@@ -238,7 +238,8 @@ def _read_ranges(
     ranges, echo, ages = outputs
     beams = numbers.axes, numbers.places, numbers.half_angles
     errors = numbers.errors
-    true = fan_ranges(pose_WB, bodies, *beams, numbers.control_point_m)
+    reach_m = errors.high_m.max()
+    true = fan_ranges(pose_WB, bodies, *beams, numbers.control_point_m, reach_m)
     count = len(true)
     normals = tick_normals(numbers.noise, tick, 2, count)
     new_ranges, new_echo = measured_ranges(true, normals, errors)

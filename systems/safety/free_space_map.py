@@ -18,12 +18,11 @@ from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
     FreeSpace,
     clear_disc,
-    end_view,
     make_free_space,
     move_window,
-    see,
 )
 from systems.safety.parameters import GuardParameters
+from systems.safety.seeing import end_view, see
 from systems.safety.views import (
     PlaceError,
     Sectors,

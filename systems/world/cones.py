@@ -6,12 +6,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.world.geometry import beyond, corners_of
+
+#: Margin of lengths, m, and of angles, rad, that exceeds all rounding errors.
+_MARGIN = 1e-6
 
 
 @njit(cache=True)
@@ -91,6 +96,78 @@ def _covers(
     return u * u + v * v <= radius * radius
 
 
+@register_jitable
+def _range_to_rectangle(
+    corners: NDArray[np.float64],
+    rectangle: NDArray[np.float64],
+    cosine: float,
+    sine: float,
+    slope: float,
+    half_angle: float,
+) -> float:  # pragma: no cover  (compiled)
+    """Returns the distance from a sensor to the outline of a rectangle in its cone.
+
+    ``corners`` are relative to the sensor. ``cosine`` and ``sine`` give the direction
+    of the axis of the cone.
+    """
+    best = np.inf
+    length, width, radius = rectangle[3], rectangle[4], rectangle[5]
+    # A line segment has one edge.
+    edges = 4
+    if radius == 0.0 and (length == 0.0 or width == 0.0):
+        edges = 2 if length == 0.0 else 1
+    for i in range(edges):
+        j = (i + 1) % 4
+        dx, dy = corners[i, 0], corners[i, 1]
+        fx, fy = corners[j, 0], corners[j, 1]
+        ax, ay = cosine * dx + sine * dy, -sine * dx + cosine * dy
+        bx, by = cosine * fx + sine * fy, -sine * fx + cosine * fy
+        if radius > 0.0:
+            along = length if i % 2 == 0 else width
+            if along > 0.0 or i == 0:
+                best = min(best, _range_to_disc(ax, ay, radius, half_angle))
+            if along == 0.0:
+                continue
+            # Move the edge to the right of its direction, which is outward.
+            out_x, out_y = radius * (by - ay) / along, radius * (ax - bx) / along
+            ax, ay, bx, by = ax + out_x, ay + out_y, bx + out_x, by + out_y
+        best = min(best, _range_to_segment(ax, ay, bx, by, slope))
+    return best
+
+
+@register_jitable
+def _is_inside(
+    corners: NDArray[np.float64], rectangle: NDArray[np.float64], x: float, y: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Returns whether a sensor at (x, y) is inside a rectangle.
+
+    ``corners`` are relative to the sensor.
+    """
+    if rectangle[5] > 0.0 and _covers(rectangle, x, y):
+        return True
+    # A line segment has no inside.
+    if rectangle[3] == 0.0 or rectangle[4] == 0.0:
+        return False
+    # The sensor is inside the rectangle if it is to the left of all edges.
+    for i in range(4):
+        j = (i + 1) % 4
+        if corners[i, 0] * corners[j, 1] - corners[i, 1] * corners[j, 0] < 0.0:
+            return False
+    return True
+
+
+@register_jitable
+def _corners_from(
+    rectangle: NDArray[np.float64], x: float, y: float
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """Returns the (4, 2) corners of a rectangle relative to a sensor at (x, y), m."""
+    corners = corners_of(rectangle)
+    for i in range(4):
+        corners[i, 0] -= x
+        corners[i, 1] -= y
+    return corners
+
+
 @njit(cache=True)
 def cone_range(
     x: float, y: float, axis: float, half_angle: float, rectangles: NDArray[np.float64]
@@ -116,37 +193,15 @@ def cone_range(
         surface is inside the cone.
     """
     best = np.inf
-    ca, sa = math.cos(axis), math.sin(axis)
+    cosine, sine = math.cos(axis), math.sin(axis)
     slope = math.tan(half_angle)
     for k in range(rectangles.shape[0]):
-        length, width, radius = rectangles[k, 3], rectangles[k, 4], rectangles[k, 5]
-        # A line segment has one edge and no inside.
-        flat = length == 0.0 or width == 0.0
-        inside = not flat
-        corners = corners_of(rectangles[k])
-        for i in range(4):
-            j = (i + 1) % 4
-            dx, dy = corners[i, 0] - x, corners[i, 1] - y
-            fx, fy = corners[j, 0] - x, corners[j, 1] - y
-            # The sensor is inside the rectangle if it is to the left of all edges.
-            if dx * fy - dy * fx < 0.0:
-                inside = False
-            ax, ay = ca * dx + sa * dy, -sa * dx + ca * dy
-            bx, by = ca * fx + sa * fy, -sa * fx + ca * fy
-            if radius > 0.0:
-                along = length if i % 2 == 0 else width
-                if along > 0.0 or i == 0:
-                    best = min(best, _range_to_disc(ax, ay, radius, half_angle))
-                if along == 0.0:
-                    continue
-                # Move the edge to the right of its direction, which is outward.
-                out_x, out_y = radius * (by - ay) / along, radius * (ax - bx) / along
-                ax, ay, bx, by = ax + out_x, ay + out_y, bx + out_x, by + out_y
-            elif flat and i > (1 if length == 0.0 else 0):
-                break
-            best = min(best, _range_to_segment(ax, ay, bx, by, slope))
-        if inside or (radius > 0.0 and _covers(rectangles[k], x, y)):
-            best = 0.0
+        rectangle = rectangles[k]
+        corners = _corners_from(rectangle, x, y)
+        if _is_inside(corners, rectangle, x, y):
+            return 0.0
+        found = _range_to_rectangle(corners, rectangle, cosine, sine, slope, half_angle)
+        best = min(best, found)
     return best
 
 
@@ -158,8 +213,14 @@ def fan_ranges(
     places: NDArray[np.float64],
     half_angles: NDArray[np.float64],
     control_point_m: float,
+    reach_m: float = np.inf,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Computes the range of each range sensor of a body with ``cone_range``.
+    """Computes the range of each range sensor of a body, as ``cone_range`` does.
+
+    Successive sensors form a fan if they have the same position and opening angle, and
+    if their directions go around in one sense. For each fan, the function visits each
+    rectangle once. It computes ranges only for the sensors of the fan whose cones can
+    meet the circle around the rectangle.
 
     Args:
         pose_WB: (3,) x, y, theta of the body frame B in the world frame W, m and rad.
@@ -170,20 +231,110 @@ def fan_ranges(
             axes of B, m.
         half_angles: (n,) halves of the opening angles, rad.
         control_point_m: Distance of P ahead of the origin of B, m.
+        reach_m: Largest range of interest, m. A larger range may be infinite instead.
 
     Returns:
         (n,) ranges, m. A range is infinite if no surface is inside the cone.
     """
     x, y, theta = pose_WB
     c, s = math.cos(theta), math.sin(theta)
-    ranges = np.empty(axes.size)
-    for k in range(axes.size):
-        ahead, left = control_point_m + places[k, 0], places[k, 1]
-        ranges[k] = cone_range(
-            x + c * ahead - s * left,
-            y + s * ahead + c * left,
-            theta + axes[k],
-            half_angles[k],
-            rectangles,
-        )
+    count = axes.size
+    ranges, cosines, sines = np.full(count, np.inf), np.empty(count), np.empty(count)
+    for k in range(count):
+        cosines[k], sines[k] = math.cos(theta + axes[k]), math.sin(theta + axes[k])
+    begin = 0
+    while begin < count:
+        end = _fan_end(begin, axes, places, half_angles)
+        ahead, left = control_point_m + places[begin, 0], places[begin, 1]
+        at = x + c * ahead - s * left, y + s * ahead + c * left
+        fan = begin, end, axes, theta, cosines, sines
+        cone = math.tan(half_angles[begin]), half_angles[begin]
+        for k in range(rectangles.shape[0]):
+            # The circle around the rectangle, enlarged by a margin for rounding errors.
+            length, width = rectangles[k, 3], rectangles[k, 4]
+            outer = 0.5 * math.sqrt(length * length + width * width)
+            outer += rectangles[k, 5] + _MARGIN
+            dx, dy = rectangles[k, 0] - at[0], rectangles[k, 1] - at[1]
+            squared, far = dx * dx + dy * dy, reach_m + outer
+            if squared <= far * far:
+                circle = math.atan2(dy, dx), math.sqrt(squared), outer
+                _see_rectangle(ranges, at, fan, cone, rectangles[k], circle)
+        begin = end
     return ranges
+
+
+@njit(cache=True)
+def _fan_end(
+    begin: int,
+    axes: NDArray[np.float64],
+    places: NDArray[np.float64],
+    half_angles: NDArray[np.float64],
+) -> int:  # pragma: no cover  (compiled)
+    """Returns the index after the last sensor of the fan that begins at ``begin``."""
+    end = begin + 1
+    while (
+        end < axes.size
+        and places[end, 0] == places[begin, 0]
+        and places[end, 1] == places[begin, 1]
+        and half_angles[end] == half_angles[begin]
+        and (axes[end] - axes[end - 1]) * (axes[begin + 1] - axes[begin]) > 0.0
+        and abs(axes[end] - axes[begin]) < math.tau
+    ):
+        end += 1
+    return end
+
+
+@register_jitable
+def _see_rectangle(
+    ranges: NDArray[np.float64],
+    at: tuple[float, float],
+    fan: Any,
+    cone: tuple[float, float],
+    rectangle: NDArray[np.float64],
+    circle: tuple[float, float, float],
+) -> None:
+    """Reduces the ranges of the sensors of a fan at ``at`` that see a rectangle.
+
+    ``cone`` has the tangent of half of the opening angle, and half of the opening
+    angle, rad. ``circle`` is the circle around the rectangle: direction of its center in W, rad,
+    distance of its center from the fan, m, and radius, m.
+    """
+    begin, end, axes, theta, cosines, sines = fan
+    slope, half_angle = cone
+    bearing, distance, outer = circle
+    corners = _corners_from(rectangle, at[0], at[1])
+    if distance <= outer:
+        inside = _is_inside(corners, rectangle, at[0], at[1])
+        for k in range(begin, end):
+            found = 0.0
+            if not inside:
+                found = _range_to_rectangle(
+                    corners, rectangle, cosines[k], sines[k], slope, half_angle
+                )
+            ranges[k] = min(ranges[k], found)
+        return
+    # Angles relative to the middle of the fan, growing from the first to the last
+    # sensor. The middle of the rectangle is at ``off``, from -pi to pi.
+    middle, way = 0.5 * (axes[begin] + axes[end - 1]), axes[end - 1] - axes[begin]
+    sense = -1.0 if way < 0.0 else 1.0
+    off = sense * (bearing - theta - middle)
+    off -= math.tau * math.floor(off / math.tau + 0.5)
+    half = math.asin(outer / distance) + half_angle + _MARGIN
+    pitch = max(abs(way) / max(end - begin - 1, 1), 1e-6)
+    for turn in (-math.tau, 0.0, math.tau):
+        low, high = off + turn - half, off + turn + half
+        if high < -0.5 * abs(way) or low > 0.5 * abs(way):
+            continue
+        # The first sensor of the interval, guessed from the mean angle between sensors.
+        k = begin + min(max(int((low + 0.5 * abs(way)) / pitch), 0), end - begin - 1)
+        while k > begin and sense * (axes[k - 1] - middle) >= low:
+            k -= 1
+        while k < end and sense * (axes[k] - middle) < low:
+            k += 1
+        while k < end and sense * (axes[k] - middle) <= high:
+            if ranges[k] > distance - outer:
+                found = _range_to_rectangle(
+                    corners, rectangle, cosines[k], sines[k], slope, half_angle
+                )
+                ranges[k] = min(ranges[k], found)
+            k += 1

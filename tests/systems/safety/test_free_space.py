@@ -17,12 +17,11 @@ from systems.safety.free_space import (
     cell_is_free,
     clear_disc,
     edge_cells,
-    end_view,
     make_free_space,
     move_window,
     nearest_cell,
-    see,
 )
+from systems.safety.seeing import end_view, see
 from systems.safety.views import PlaceError, lasting, place_error, sensor_sectors
 from systems.world.cones import fan_ranges
 
