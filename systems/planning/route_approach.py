@@ -49,8 +49,6 @@ class Approach(NamedTuple):
     """Position of the local goal, x in the world frame W, m."""
     y: float
     """Position of the local goal, y in W, m."""
-    is_target: bool
-    """Whether the local goal is the target itself."""
     along_m_s: float
     """Speed of the target in the direction of the local goal."""
 
@@ -82,7 +80,7 @@ def approach_on_route(
     x, y, ahead = pose[0], pose[1], numbers.follow.control_point_m
     px, py = x + ahead * math.cos(pose[2]), y + ahead * math.sin(pose[2])
     if valid[0] < 0.5:
-        return Approach(0.0, px, py, False, 0.0)
+        return Approach(0.0, px, py, 0.0)
     if tick % numbers.replan_ticks == 0 or way.points[0] == 0:
         clear = np.array([[target[0], target[1], SOURCE_CLEARANCE_M]])
         goal = target[0], target[1]
@@ -93,10 +91,9 @@ def approach_on_route(
     # The last point of the route is the middle of the target's cell.
     last = way.path[way.points[0] - 1]
     near = math.hypot(gx - target[0], gy - target[1]) < SOURCE_CLEARANCE_M
-    is_target = near and gx == last[0] and gy == last[1]
-    if is_target:
+    if near and gx == last[0] and gy == last[1]:
         gx, gy, left = target[0], target[1], straight
     bearing = math.atan2(gy - y, gx - x)
     along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
     speed = wanted_speed(left - numbers.follow.distance_m, along)
-    return Approach(speed, gx, gy, is_target, along)
+    return Approach(speed, gx, gy, along)

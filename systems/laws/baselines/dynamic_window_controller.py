@@ -243,7 +243,7 @@ def _value(
 
 @njit(cache=True)
 def _smoothed(values: Any, i: int, j: int) -> float:  # pragma: no cover  (compiled)
-    """Returns the mean of a value and of those neighbors in the grid that are numbers."""
+    """Returns the mean of a value and of its neighbors that are numbers."""
     total, count = 0.0, 0
     for a in range(max(i - 1, 0), min(i + 2, values.shape[0])):
         for b in range(max(j - 1, 0), min(j + 2, values.shape[1])):
@@ -259,16 +259,14 @@ def _wanted_speeds(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Returns the least and the wanted speed, m/s.
 
-    The robot may back off to get away from obstacles, but not if it has arrived. On its
-    last straight way, it turns to the target before it drives.
+    The robot may back off to get away from obstacles, but not if it has arrived. If the
+    local goal is far off its heading, it turns before it drives.
     """
     wanted, least = approach.speed_m_s, SPEED_LIMITS[0]
     if wanted <= 0.0:
         return wanted, wanted
-    if approach.is_target:
-        bearing = math.atan2(approach.y - pose[1], approach.x - pose[0])
-        wanted = slowed_by(wrapped(bearing - pose[2]), wanted)
-    return least, wanted
+    bearing = math.atan2(approach.y - pose[1], approach.x - pose[0])
+    return least, slowed_by(wrapped(bearing - pose[2]), wanted)
 
 
 @register_jitable

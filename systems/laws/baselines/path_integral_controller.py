@@ -56,8 +56,6 @@ _GOAL_GAIN = 5.0
 _FORWARD_GAIN = 0.81
 #: Cost of a position nearer to an obstacle than the clearance.
 _COLLISION_COST = 1_000.0
-#: Least number of discs that cover the body along its longer side.
-_DISCS = 3
 #: If the local goal is farther off the heading than this angle, rad, the robot first
 #: turns on the spot, as with the rotation shim controller of Nav2 (there: 0.785).
 _TURN_FIRST_RAD = 0.785
@@ -411,7 +409,7 @@ def covering_discs(
 ) -> tuple[NDArray[np.float64], float]:
     """Covers a rectangle by equal discs in a row along its longer side.
 
-    A disc extends beyond the longer sides by at most a tenth of the shorter side.
+    The discs extend beyond the sides by at most 6 % of the shorter side.
 
     Args:
         half_length: Half of the extent along x, m.
@@ -422,7 +420,7 @@ def covering_discs(
         radius of the discs, m.
     """
     longer, shorter = max(half_length, half_width), min(half_length, half_width)
-    count = max(math.ceil(1.5 * longer / shorter), _DISCS)
+    count = math.ceil(2.0 * longer / shorter)
     part = longer / count
     row = part * (2.0 * np.arange(count) - count + 1.0)
     discs = np.zeros((count, 2))
