@@ -88,6 +88,7 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
             "attraction": robot.attraction,
             "velocity_term": robot.collision_vector.velocity_term,
             "guard": robot.own_map,
+            "plant": robot.plant,
         }
     if name in LAWS:
         controller = LAWS[name].controller

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from systems.framework.parameters import (
-    Length,
     NonNegative,
     NonNegativeLength,
     Parameters,
-    Positive,
 )
 from systems.laws.law import Equation, Law
 
@@ -15,19 +13,16 @@ from systems.laws.law import Equation, Law
 class DynamicWindowParameters(Parameters):
     """Weights and limits of the dynamic window."""
 
-    clearance_m: NonNegativeLength = 0.19
-    """Distance that the robot keeps from cells with echoes, m."""
-    heading_gain: NonNegative = 0.91
-    """Weight alpha of the heading (paper: 2)."""
-    distance_gain: NonNegative = 3.0
-    """Weight beta of the distance to the nearest obstacle on the arc (paper: 0.2)."""
-    speed_gain: NonNegative = 3.6
-    """Weight gamma of the speed (paper: 0.2)."""
-    turn_acceleration_rad_s2: Positive = 6.1
-    """Yaw acceleration that limits the window, and that stops a turn, rad/s^2."""
-    farthest_m: Length = 2.6
-    """Largest distance along the arc that counts, m. An obstacle that is farther away
-    counts as if it were at this distance."""
+    clearance_m: NonNegativeLength = 0.05
+    """Distance that the robot keeps from the middles of cells with echoes, m (one cell
+    of the map)."""
+    heading_gain: NonNegative = 2.0
+    """Weight alpha of the heading (as in the paper)."""
+    distance_gain: NonNegative = 0.2
+    """Weight beta of the distance to the nearest obstacle on the arc (as in the
+    paper)."""
+    speed_gain: NonNegative = 0.2
+    """Weight gamma of the speed (as in the paper)."""
 
 
 DWA = Law(

@@ -19,7 +19,7 @@ class PathIntegralParameters(Parameters):
     controller in Nav2.
     """
 
-    clearance_m: NonNegativeLength = 0.08
+    clearance_m: NonNegativeLength = 0.03
     """Distance that the robot keeps from cells with echoes, m."""
     turn_spread_rad_s: Positive = 1.1
     """Standard deviation of the sampled yaw rates, rad/s."""

@@ -18,6 +18,8 @@ from systems.safety.free_space import FreeSpace, cells_within
 # ``_LEAST_HITS``: least number of hits of an occupied cell.
 # ``_MOST_HITS``: number of hits above which the certainty does not increase.
 _LEAST_HITS, _MOST_HITS = 1.0, 6.0
+#: Distance from the target within which echoes may be echoes of the target, m.
+SOURCE_CLEARANCE_M = 0.5
 
 
 @njit(cache=True)
@@ -31,8 +33,8 @@ def list_occupied(
         x: Position, x in the world frame W, m.
         y: Position, y in W, m.
         reach: Half of the side of the square, m.
-        clear: Position (x, y) and radius of the followed target, m. The list omits
-            cells within this radius.
+        clear: Position (x, y) and radius of a disc, m. The list omits the cells in this
+            disc. A negative radius omits no cells.
 
     Returns:
         (n, 3) array with one row per cell: x and y of the middle, m, and the certainty

@@ -13,9 +13,6 @@ from systems.base.robot import RobotParameters
 from systems.framework.block import OBJECT, Block, Port
 from systems.planning.occupied import list_occupied
 
-#: Distance from the target within which echoes count as echoes of the target, m.
-SOURCE_CLEARANCE_M = 0.5
-
 
 class BaselineController(Block):
     """Declares the ports of every baseline: target and pose in, twist out."""
@@ -37,9 +34,10 @@ class MapController(BaselineController):
 
 @register_jitable
 def occupied_around(inputs: Any, reach_m: float) -> NDArray[np.float64]:
-    """Lists the occupied cells around the robot, except those near the target.
+    """Lists the occupied cells around the robot.
 
     A cell is occupied if an echo came from it and no sensor has seen it free since.
+    The body of the target is an obstacle, too.
 
     Args:
         inputs: Values of the input ports of a ``MapController``.
@@ -49,9 +47,8 @@ def occupied_around(inputs: Any, reach_m: float) -> NDArray[np.float64]:
         (n, 3) cells: x and y of the middle in the world frame W, m, and the certainty
         that the cell is occupied, 0 to 1.
     """
-    target, pose = inputs[0], inputs[3]
-    clear = target[0], target[1], SOURCE_CLEARANCE_M
-    return list_occupied(inputs[4], pose[0], pose[1], reach_m, clear)
+    pose = inputs[3]
+    return list_occupied(inputs[4], pose[0], pose[1], reach_m, (0.0, 0.0, -1.0))
 
 
 def half_size(robot: RobotParameters) -> tuple[float, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.block import Step
 from systems.framework.compiling import njit
@@ -20,18 +21,30 @@ from systems.laws.baselines.baseline_controller import (
 )
 from systems.laws.dynamic_window import DynamicWindowParameters
 from systems.laws.parameters import AttractionParameters
-from systems.planning.following import SPEED_LIMITS, FollowNumbers, approach
-from systems.planning.turning import wrapped
+from systems.planning.body_contact import in_body_axes, time_to_contact
+from systems.planning.following import SPEED_LIMITS, FollowNumbers
+from systems.planning.route_approach import (
+    Approach,
+    RouteNumbers,
+    approach_on_route,
+    route_numbers,
+)
+from systems.planning.turning import slowed_by, wrapped
+from systems.planning.way import Way, make_way
+from systems.safety.parameters import GuardParameters
 
 # ``_SPEEDS``: number of speeds in the grid over a window.
 # ``_TURNS``: number of yaw rates in the grid over a window.
 _SPEEDS, _TURNS = 9, 17
-#: Half side of the square around the robot in which cells count, m.
+#: Half side of the square around the robot in which cells count, m. An obstacle that is
+#: farther away on an arc counts as if it were at this distance.
 _REACH_M = 2.5
-#: Acceleration that limits the window, and deceleration of a robot that brakes, m/s^2.
-_ACCELERATION_M_S2 = 1.0
-#: Time from one choice to the next, s.
-_PERIOD_S = 0.1
+# Limits of the window, and deceleration of a robot that brakes; the values of the robot
+# Rhino in the paper.
+# ``_ACCELERATION_M_S2``: acceleration, m/s^2.
+# ``_TURN_ACCELERATION_RAD_S2``: yaw acceleration (60 deg/s^2), rad/s^2.
+# ``_PERIOD_S``: time from one choice to the next, s.
+_ACCELERATION_M_S2, _TURN_ACCELERATION_RAD_S2, _PERIOD_S = 0.5, math.pi / 3.0, 0.25
 
 
 class WindowNumbers(NamedTuple):
@@ -39,110 +52,81 @@ class WindowNumbers(NamedTuple):
 
     gains: tuple[float, float, float]
     """Weights of heading, distance, and speed."""
-    turn_acceleration_rad_s2: float
-    farthest_m: float
     half_size: tuple[float, float]
     """Half of the body's length and width, m."""
     clearance_m: float
     """Distance that the body keeps from cells with echoes, m."""
+    half_separation_m: float
+    """Half of the distance between the wheels, m."""
+    top_speed_m_s: float
+    """Largest rim speed of each wheel, m/s."""
+    lag_s: float
+    """Time constant of the motors and delay of the command, s."""
 
 
 class DynamicWindowNumbers(NamedTuple):
     """Constants of the step of ``DynamicWindowController``."""
 
     window: WindowNumbers
-    follow: FollowNumbers
+    route: RouteNumbers
     period_ticks: int
 
 
+class DynamicWindowState(NamedTuple):
+    """The state of ``DynamicWindowController``."""
+
+    motion: NDArray[np.float64]
+    """(2,) chosen speed, m/s, and yaw rate, rad/s."""
+    way: Way
+    """Route to the target."""
+
+
 @njit(cache=True)
-def time_to_contact(
-    places: Any, motion: tuple[float, float], half: tuple[float, float]
+def _spread(
+    low: float, high: float, k: int, count: int
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes when the moving robot first covers one of several points.
+    """Returns number k of ``count`` values from low to high.
 
-    The robot keeps its speed and yaw rate. Seen from the robot, the points then move:
-    straight backward if the yaw rate is zero, otherwise on circles around the center of
-    the robot's arc. The function computes for each point when its line or circle first
-    meets the rectangle of the body.
-
-    Args:
-        places: (n, 2) points in the body frame of the robot, m.
-        motion: Speed, m/s, and yaw rate, rad/s.
-        half: Half of the body's length and half of its width, m.
-
-    Returns:
-        Time of the first contact, s; infinite if there is none. Points that the body
-        already covers do not count.
+    The value nearest to 0 is 0, so that the grid contains a straight motion and a turn
+    on the spot.
     """
-    v, w = motion
-    a, b = half
-    best = np.inf
-    if abs(w) < 1e-6:
-        for n in range(len(places)):
-            gap = math.copysign(places[n, 0], v * places[n, 0]) - a
-            if v != 0.0 and gap > 0.0 and abs(places[n, 1]) <= b:
-                best = min(best, gap / abs(v))
-        return best
-    # Center of the arc: (0, turn). Only radii from least to most meet the body.
-    turn = v / w
-    least, most = max(abs(turn) - b, 0.0), math.hypot(a, abs(turn) + b)
-    for n in range(len(places)):
-        x, y = places[n, 0], places[n, 1] - turn
-        far = math.hypot(x, y)
-        if far < least or far > most or (abs(x) <= a and abs(places[n, 1]) <= b):
-            continue
-        angle = _angle_to_contact(x, y, far, turn, half, -w)
-        best = min(best, angle / abs(w))
-    return best
+    step = (high - low) / (count - 1)
+    value = low + k * step
+    return 0.0 if abs(value) < 0.5 * step else value
 
 
 @njit(cache=True)
-def _angle_to_contact(
-    x: float, y: float, far: float, turn: float, half: tuple[float, float], sign: float
+def _time_to_stop(
+    motion: tuple[float, float], now: tuple[float, float], numbers: WindowNumbers
 ) -> float:  # pragma: no cover  (compiled)
-    """Computes the angle by which a point turns about (0, 0) until it meets the body.
+    """Computes how long a motion must stay clear for the robot to brake in time, s.
 
-    The point starts at (x, y) and keeps the distance ``far`` from (0, 0). The center of
-    the body is at (0, -turn). The point turns counterclockwise if ``sign`` is positive.
+    The paper requires v <= sqrt(2 dist a): the way v^2/(2a) of a braking robot must be
+    shorter than the distance of the contact. The way here also contains that of one
+    period, and that of the lag, in which the robot still has its present speed. The
+    result is this way, divided by the speed. The yaw rate has the same condition.
     """
-    a, b = half
-    begin, best = math.atan2(y, x), np.inf
-    for side in (1.0, -1.0):
-        for other in (1.0, -1.0):
-            # Crossing of the front or rear side.
-            if far >= a:
-                ey = other * math.sqrt(far * far - a * a)
-                if abs(ey + turn) <= b:
-                    off = math.atan2(ey, side * a) - begin
-                    best = min(best, math.copysign(1.0, sign) * off % math.tau)
-            # Crossing of the left or right side.
-            ey = side * b - turn
-            if far >= abs(ey):
-                ex = other * math.sqrt(far * far - ey * ey)
-                if abs(ex) <= a:
-                    off = math.atan2(ey, ex) - begin
-                    best = min(best, math.copysign(1.0, sign) * off % math.tau)
-    return best
+    needed = 0.0
+    for k in range(2):
+        speed = abs(motion[k])
+        braking = _ACCELERATION_M_S2 if k == 0 else _TURN_ACCELERATION_RAD_S2
+        if speed > 0.0:
+            lag = numbers.lag_s * max(abs(now[k]) / speed, 1.0)
+            needed = max(needed, _PERIOD_S + lag + 0.5 * speed / braking)
+    return needed
 
 
 @njit(cache=True)
-def _in_body_axes(
-    places: Any, pose: Any, half: tuple[float, float]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Returns points in B, m: first those outside the rectangle, then those inside."""
-    found, beyond, within = np.empty((len(places), 2)), 0, len(places)
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    for n in range(len(places)):
-        dx, dy = places[n, 0] - pose[0], places[n, 1] - pose[1]
-        x, y = c * dx + s * dy, c * dy - s * dx
-        if abs(x) <= half[0] and abs(y) <= half[1]:
-            within -= 1
-            found[within] = x, y
-        else:
-            found[beyond] = x, y
-            beyond += 1
-    return found[:beyond], found[within:]
+def _braked(
+    now: tuple[float, float], dv: float, dw: float
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Returns the slowest motion of the window on the present arc."""
+    kept = 0.0
+    if abs(now[0]) > dv:
+        kept = 1.0 - dv / abs(now[0])
+    if abs(now[1]) > dw:
+        kept = max(kept, 1.0 - dw / abs(now[1]))
+    return kept * now[0], kept * now[1]
 
 
 @njit(cache=True)
@@ -150,115 +134,192 @@ def choose_in_window(
     places: Any,
     pose: Any,
     now: tuple[float, float],
-    wanted: float,
-    bearing: float,
+    speeds: tuple[float, float],
+    goal: tuple[float, float],
     numbers: WindowNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Chooses speed and yaw rate by the dynamic window approach (Fox, eq. 13-15).
 
     The window contains all speeds and yaw rates that the robot can reach in one period.
     The function tries a grid of these motions. It rejects a motion if the robot could
-    not brake to rest before it covers an occupied cell. From the remaining motions, it
-    chooses the motion with the largest weighted sum of three terms. The terms reward:
+    not brake to rest before it covers an occupied cell (``_time_to_stop``). From the
+    remaining motions, it chooses the motion with the largest weighted sum of three
+    terms, each from 0 to 1. The terms reward:
 
-    - heading: a small angle between the heading after the motion and the target
-    - distance: a long way to the first contact
+    - heading: a small angle between the heading after the motion and the goal
+    - distance: a long way to the first contact, of at most half a circle
     - speed: a speed near the wanted speed
+
+    As in the paper, the sum is smoothed: the sum of a motion is the mean over the
+    motion and its neighbors in the grid. Rejected motions have the sum 0; motions above
+    the top speed do not count.
 
     Args:
         places: (n, 3) occupied cells: x and y in the world frame W, m, and the
             certainty, 0 to 1 (not used).
         pose: Pose (x, y, theta) of the axle in W, m and rad.
         now: Present speed, m/s, and present yaw rate, rad/s.
-        wanted: Wanted speed toward the target, m/s.
-        bearing: Direction of the target in W, rad.
+        speeds: Least speed, and wanted speed toward the goal, m/s. The wanted speed is
+            also the largest speed.
+        goal: Position (x, y) of the local goal in W, m.
         numbers: Weights and limits.
 
     Returns:
-        Speed, m/s, and yaw rate, rad/s. If the function rejects all motions, it returns
-        the lowest speed of the window and the yaw rate nearest to zero.
+        Speed, m/s, and yaw rate, rad/s. If the function rejects all motions, the robot
+        brakes on its present arc.
     """
-    # The window.
-    heading_gain, distance_gain, speed_gain = numbers.gains
-    turn_braking = numbers.turn_acceleration_rad_s2
-    least, most, turn = SPEED_LIMITS
-    dv, dw = _ACCELERATION_M_S2 * _PERIOD_S, turn_braking * _PERIOD_S
-    low = max(now[0] - dv, least if wanted < 0.0 else 0.0)
-    high = max(min(now[0] + dv, most), low)
+    _, most, turn = SPEED_LIMITS
+    top, half = numbers.top_speed_m_s, numbers.half_separation_m
+    dv, dw = _ACCELERATION_M_S2 * _PERIOD_S, _TURN_ACCELERATION_RAD_S2 * _PERIOD_S
+    least, wanted = speeds
+    low = max(now[0] - dv, least)
+    high = max(min(now[0] + dv, most, wanted), low)
     right, left = max(now[1] - dw, -turn), min(now[1] + dw, turn)
-    # The slowest motion is the fallback.
-    slower = min(max(0.0, now[1] - dw), now[1] + dw)
-    found, best = (low, slower), -np.inf
     body, kept = numbers.half_size, numbers.clearance_m
     wide = body[0] + kept, body[1] + kept
-    around, near = _in_body_axes(places, pose, wide)
+    around, near = in_body_axes(places, pose, wide)
+    values = np.full((_SPEEDS, _TURNS), np.nan)
     for i in range(_SPEEDS):
-        v = low + (high - low) * i / (_SPEEDS - 1)
+        v = _spread(low, high, i, _SPEEDS)
         for j in range(_TURNS):
-            w = right + (left - right) * j / (_TURNS - 1)
+            w = _spread(right, left, j, _TURNS)
+            if abs(v) + half * abs(w) > top + 1e-9:
+                continue
             # Points outside the clearance must stay outside it. Points already inside
             # the clearance must stay outside the body.
             contact = time_to_contact(around, (v, w), wide)
             contact = min(contact, time_to_contact(near, (v, w), body))
-            # The paper requires v <= sqrt(2 dist a). With dist = v t this condition is
-            # t >= v/(2 a). The yaw rate has the same condition.
-            stops = max(abs(v) / _ACCELERATION_M_S2, abs(w) / turn_braking)
-            if contact < 0.5 * stops:
-                continue
-            distance = numbers.farthest_m
-            if contact < np.inf:
-                distance = min(abs(v) * contact, distance)
-            # The heading when the robot has stopped its turn after this period.
-            theta = pose[2] + w * _PERIOD_S + 0.5 * w * abs(w) / turn_braking
-            heading = 1.0 - abs(wrapped(bearing - theta)) / math.pi
-            value = heading_gain * heading
-            value += distance_gain * distance / numbers.farthest_m
-            value -= speed_gain * abs(v - wanted) / most
-            if value > best:
-                best, found = value, (v, w)
+            values[i, j] = 0.0
+            if contact >= _time_to_stop((v, w), now, numbers):
+                values[i, j] = _value((v, w), contact, pose, wanted, goal, numbers)
+    found, best = _braked(now, dv, dw), 0.0
+    for i in range(_SPEEDS):
+        for j in range(_TURNS):
+            if values[i, j] > 0.0:
+                value = _smoothed(values, i, j)
+                if value > best:
+                    v, w = (
+                        _spread(low, high, i, _SPEEDS),
+                        _spread(right, left, j, _TURNS),
+                    )
+                    best, found = value, (v, w)
     return found
+
+
+@njit(cache=True)
+def _value(
+    motion: tuple[float, float],
+    contact: float,
+    pose: Any,
+    wanted: float,
+    goal: tuple[float, float],
+    numbers: WindowNumbers,
+) -> float:  # pragma: no cover  (compiled)
+    """Computes the weighted sum of heading, distance, and speed of a motion.
+
+    ``contact`` is the time to the first contact, s. The distance along an arc is at
+    most half a circle, because the robot would then come back. It counts only for
+    motions that lead forward. The result is positive.
+    """
+    v, w = motion
+    heading_gain, distance_gain, speed_gain = numbers.gains
+    distance = 0.0
+    if v > 0.0:
+        way = v * contact if contact < np.inf else _REACH_M
+        if w != 0.0:
+            way = min(way, math.pi * v / abs(w))
+        distance = min(way, _REACH_M) / _REACH_M
+    # Position after this period, and heading when the robot has stopped its turn.
+    middle = pose[2] + 0.5 * w * _PERIOD_S
+    x = pose[0] + v * _PERIOD_S * math.cos(middle)
+    y = pose[1] + v * _PERIOD_S * math.sin(middle)
+    theta = pose[2] + w * _PERIOD_S + 0.5 * w * abs(w) / _TURN_ACCELERATION_RAD_S2
+    bearing = math.atan2(goal[1] - y, goal[0] - x)
+    heading = 1.0 - abs(wrapped(bearing - theta)) / math.pi
+    speed = max(1.0 - abs(v - wanted) / numbers.top_speed_m_s, 0.0)
+    value = heading_gain * heading + distance_gain * distance + speed_gain * speed
+    return max(value, 1e-9)
+
+
+@njit(cache=True)
+def _smoothed(values: Any, i: int, j: int) -> float:  # pragma: no cover  (compiled)
+    """Returns the mean of a value and of its neighbors that are numbers."""
+    total, count = 0.0, 0
+    for a in range(max(i - 1, 0), min(i + 2, values.shape[0])):
+        for b in range(max(j - 1, 0), min(j + 2, values.shape[1])):
+            if not math.isnan(values[a, b]):
+                total += values[a, b]
+                count += 1
+    return total / count
+
+
+@njit(cache=True)
+def _wanted_speeds(
+    pose: Any, approach: Approach
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Returns the least and the wanted speed, m/s.
+
+    The robot may back off to get away from obstacles, but not if it has arrived. If the
+    local goal is far off its heading, it turns before it drives.
+    """
+    wanted, least = approach.speed_m_s, SPEED_LIMITS[0]
+    if wanted <= 0.0:
+        return wanted, wanted
+    bearing = math.atan2(approach.y - pose[1], approach.x - pose[0])
+    return least, slowed_by(wrapped(bearing - pose[2]), wanted)
 
 
 @register_jitable
 def dynamic_window_step(
-    tick: int, state: Any, inputs: Any, outputs: Any, numbers: DynamicWindowNumbers
+    tick: int,
+    state: DynamicWindowState,
+    inputs: Any,
+    outputs: Any,
+    numbers: DynamicWindowNumbers,
 ) -> None:
-    """Computes speed and yaw rate of the robot for one control period.
-
-    The state contains the previous choice of both: speed, m/s, and yaw rate, rad/s.
-    """
-    pose = inputs[3]
+    """Computes speed and yaw rate of the robot for one control period."""
+    pose, motion = inputs[3], state.motion
     if tick % numbers.period_ticks == 0:
-        wanted, bearing = approach(inputs, numbers.follow)
+        approach = approach_on_route(tick, inputs, state.way, numbers.route)
         places = occupied_around(inputs, _REACH_M)
-        now, at = (state[0], state[1]), (pose[0], pose[1], pose[2])
-        state[0], state[1] = choose_in_window(
-            places, at, now, wanted, bearing, numbers.window
+        now, at = (motion[0], motion[1]), (pose[0], pose[1], pose[2])
+        goal = approach.x, approach.y
+        speeds = _wanted_speeds(at, approach)
+        motion[0], motion[1] = choose_in_window(
+            places, at, now, speeds, goal, numbers.window
         )
-    outputs[0][0], outputs[0][1] = state[0], state[1]
+    outputs[0][0], outputs[0][1] = motion[0], motion[1]
 
 
 class DynamicWindowController(MapController):
     """Chooses a motion that the robot can reach and from which it can stop in time.
 
-    Ten times per second, the block considers the speeds and yaw rates that the robot
-    can reach with its accelerations. It keeps those from which the robot can brake
-    before its body covers an occupied cell. It then chooses the motion with the largest
-    weighted sum of heading, distance, and speed (see ``choose_in_window``).
+    The block plans a route to the target on its map, as move_base does, and drives
+    toward a point of the route (``systems.planning.route_approach``). Ten times per
+    second, it considers the speeds and yaw rates that the robot can reach with its
+    accelerations. It keeps those from which the robot can brake before its body covers
+    an occupied cell. It then chooses the motion with the largest weighted sum of
+    heading, distance, and speed (see ``choose_in_window``). Objective and gains are
+    those of the paper.
 
-    The block differs from the paper in two points:
+    The block differs from the paper in these points:
 
+    - The heading points to the local goal on the route, not to the target.
     - The speed term rewards speeds near the wanted speed, because a follower must not
       arrive at full speed.
+    - The way to brake contains the way of one period and of the motors' lag.
+    - An arc counts up to half a circle, so that circles do not count as long ways.
     - The obstacles are cells of a map instead of lines. A cell is occupied if an echo
       came from it and no sensor has seen it free since.
 
-    The discrete state is the previous motion. There is no latency.
+    The state contains the previous motion and the route. There is no latency.
 
     Args:
         robot: Size of the body, and position of the control point P ahead of the axle.
         attraction: ``AttractionParameters``. The block uses only the follow distance.
         gains: ``DynamicWindowParameters``.
+        guard: Parameters of the map.
+        plant: Lag of the motors.
         tick_s: Control period, s.
 
     Reference: Fox, Burgard and Thrun, The dynamic window approach to collision
@@ -271,21 +332,26 @@ class DynamicWindowController(MapController):
         robot: RobotParameters = RobotParameters(),
         attraction: AttractionParameters = AttractionParameters(),
         gains: DynamicWindowParameters = DynamicWindowParameters(),
+        guard: GuardParameters = GuardParameters(),
+        plant: PlantParameters = PlantParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("dynamic_window_controller")
+        body = half_size(robot)
         window = WindowNumbers(
             (gains.heading_gain, gains.distance_gain, gains.speed_gain),
-            gains.turn_acceleration_rad_s2,
-            gains.farthest_m,
-            half_size(robot),
+            body,
             gains.clearance_m,
+            0.5 * robot.wheel_separation_m,
+            robot.top_speed_m_s,
+            plant.motor_lag_s + tick_s,
         )
+        follow = FollowNumbers(attraction.follow_distance_m, robot.control_point_m)
         numbers = DynamicWindowNumbers(
             window,
-            FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
+            route_numbers(follow, body[1] + gains.clearance_m, tick_s),
             max(round(_PERIOD_S / tick_s), 1),
         )
-        step = Step(dynamic_window_step, numbers, [0.0, 0.0])
-        self.declare(step, tick_s=tick_s)
+        state = DynamicWindowState(np.zeros(2), make_way(guard.cells))
+        self.declare(Step(dynamic_window_step, numbers, state), tick_s=tick_s)

@@ -9,28 +9,32 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from systems.base.robot import RobotParameters, body_radius
+from systems.base.robot import RobotParameters
 from systems.framework.block import RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
-    SOURCE_CLEARANCE_M,
     MapController,
     half_size,
     occupied_around,
 )
 from systems.laws.parameters import AttractionParameters
 from systems.laws.path_integral import PathIntegralParameters
-from systems.planning.carrot import find_carrot
+from systems.planning.body_contact import in_body_axes, time_to_contact
 from systems.planning.following import (
     APPROACH_GAIN,
     SOURCE_SHARE,
     SPEED_LIMITS,
     FollowNumbers,
-    wanted_speed,
 )
-from systems.planning.turning import wrapped
-from systems.planning.way import Way, find_way, make_way
+from systems.planning.route_approach import (
+    Approach,
+    RouteNumbers,
+    approach_on_route,
+    route_numbers,
+)
+from systems.planning.turning import turn_rate, wrapped
+from systems.planning.way import Way, make_way
 from systems.safety.parameters import GuardParameters
 
 #: Half side of the window of the distance field, m. A sequence stays within it.
@@ -52,13 +56,9 @@ _GOAL_GAIN = 5.0
 _FORWARD_GAIN = 0.81
 #: Cost of a position nearer to an obstacle than the clearance.
 _COLLISION_COST = 1_000.0
-#: Number of discs that cover the body from side to side.
-_DISCS = 3
-# ``_DETOUR``: a route is a detour if its length exceeds the straight distance times
-#   this factor.
-# ``_LOOK_AHEAD_M``: on a detour, the robot drives toward a point of the route. The
-#   point is at most this far away, m.
-_DETOUR, _LOOK_AHEAD_M = 1.15, 1.5
+#: If the local goal is farther off the heading than this angle, rad, the robot first
+#: turns on the spot, as with the rotation shim controller of Nav2 (there: 0.785).
+_TURN_FIRST_RAD = 0.785
 #: Length of a step to a diagonal neighbor, in cells.
 _ACROSS = math.sqrt(2.0)
 
@@ -71,11 +71,10 @@ class RollNumbers(NamedTuple):
     angle_gain: float
     obstacle_gain: float
     inflation_m: float
-    discs: tuple[float, float]
-    """Position and radius of the discs that cover the body. The first number is the
-    distance of the outer discs from the middle of the axle, m. The second is the radius
-    of every disc, including the clearance, m.
-    """
+    discs: NDArray[np.float64]
+    """(n, 2) middles of the discs that cover the body, in the body frame B, m."""
+    radius_m: float
+    """Radius of every disc, including the clearance, m."""
     control_point_m: float
 
 
@@ -83,9 +82,9 @@ class PathIntegralNumbers(NamedTuple):
     """Constants of the step of ``PathIntegralController``."""
 
     roll: RollNumbers
-    follow: FollowNumbers
-    radius_m: float
-    """Radius of the disc for which routes are planned, m."""
+    route: RouteNumbers
+    wide: tuple[float, float]
+    """Half of the body's length and width, including the clearance, m."""
     period_ticks: int
     noise: NDArray[np.float64]
     """(rounds, samples, steps, 2) normal random numbers of standard deviation 1."""
@@ -97,7 +96,7 @@ class PathIntegralState(NamedTuple):
     plan: NDArray[np.float64]
     """(steps, 2) speed, m/s, and yaw rate, rad/s, of each step."""
     way: Way
-    """Memory for the route. Each plan computes a new route."""
+    """Route to the target."""
 
 
 @njit(cache=True)
@@ -210,7 +209,6 @@ def _cost(
     """
     least, most, turn = SPEED_LIMITS
     spread, turn_spread = _SPEED_SPREAD_M_S, numbers.turn_spread_rad_s
-    aside, radius = numbers.discs
     steps, dt, half = len(controls), _STEP_S, 0.5 * len(field)
     x, y, theta, total = 0.0, 0.0, pose[2], 0.0
     for k in range(steps):
@@ -228,12 +226,12 @@ def _cost(
         x, y, theta = x + v * dt * c, y + v * dt * s, theta + 0.5 * w * dt
         # Clearance of the discs. Cells outside the window count as free.
         nearest = np.inf
-        for d in range(_DISCS):
-            at = aside * (d - 1)
-            i = math.floor((x - at * s) / cell + half)
-            j = math.floor((y + at * c) / cell + half)
+        for d in range(len(numbers.discs)):
+            along, aside = numbers.discs[d, 0], numbers.discs[d, 1]
+            i = math.floor((x + along * c - aside * s) / cell + half)
+            j = math.floor((y + along * s + aside * c) / cell + half)
             if 0 <= i < len(field) and 0 <= j < len(field):
-                nearest = min(nearest, field[i, j] - radius)
+                nearest = min(nearest, field[i, j] - numbers.radius_m)
         cost = max(-v, 0.0) * _FORWARD_GAIN
         if nearest < 0.0:
             cost += _COLLISION_COST
@@ -265,58 +263,68 @@ def path_integral_step(
     Every ``period_ticks`` control periods, the step first makes a new plan. The output
     is always the first motion of the plan.
     """
-    target, velocity, pose = inputs[0], inputs[1], inputs[3]
-    plan, space, twist = state.plan, inputs[4], outputs[0]
+    pose, plan, space, twist = inputs[3], state.plan, inputs[4], outputs[0]
     steps = len(plan)
     if tick % numbers.period_ticks == 0:
         controls = np.zeros((steps, 2))
-        # Start from the remaining steps of the last plan, and repeat its last step.
-        for k in range(steps):
-            last = min(k + 1, steps - 1)
-            controls[k, 0], controls[k, 1] = plan[last, 0], plan[last, 1]
-        at, valid = (pose[0], pose[1], pose[2]), inputs[2][0] > 0.5
-        place, speed = (target[0], target[1]), (velocity[0], velocity[1])
-        goal = _goal(at, place, speed, valid, space, state.way, numbers)
+        approach = approach_on_route(tick, inputs, state.way, numbers.route)
+        at = pose[0], pose[1], pose[2]
         places = occupied_around(inputs, _WINDOW_M)
-        cell = space.cell_m
-        field = distance_field(places, at[0], at[1], _WINDOW_M, cell)
-        noise = numbers.noise[tick // numbers.period_ticks % _ROUNDS]
-        roll_out(controls, noise, at, goal, field, cell, numbers.roll)
+        turn = _turn_first(places, at, approach, numbers.wide)
+        if turn != 0.0:
+            controls[0, 1] = turn
+        else:
+            # Start from the remaining steps of the last plan, and repeat its last step.
+            for k in range(steps):
+                last = min(k + 1, steps - 1)
+                controls[k, 0], controls[k, 1] = plan[last, 0], plan[last, 1]
+            goal = _goal(at, approach, numbers.route.follow)
+            cell = space.cell_m
+            field = distance_field(places, at[0], at[1], _WINDOW_M, cell)
+            noise = numbers.noise[tick // numbers.period_ticks % _ROUNDS]
+            roll_out(controls, noise, at, goal, field, cell, numbers.roll)
         for k in range(steps):
             plan[k, 0], plan[k, 1] = controls[k, 0], controls[k, 1]
     twist[0], twist[1] = plan[0, 0], plan[0, 1]
 
 
+@njit(cache=True)
+def _turn_first(
+    places: Any, pose: Any, approach: Approach, wide: tuple[float, float]
+) -> float:  # pragma: no cover  (compiled)
+    """Returns the yaw rate of a turn on the spot, rad/s, or 0 if MPPI chooses a motion.
+
+    The robot turns if it has to drive on, if its heading is far off the local goal, and
+    if it can turn to the local goal without contact.
+    """
+    bearing = math.atan2(approach.y - pose[1], approach.x - pose[0])
+    error = wrapped(bearing - pose[2])
+    if approach.speed_m_s <= 0.0 or abs(error) < _TURN_FIRST_RAD:
+        return 0.0
+    around, _ = in_body_axes(places, pose, wide)
+    turn = math.copysign(1.0, error)
+    if time_to_contact(around, (0.0, turn), wide) < abs(error):
+        return 0.0
+    return turn_rate(error)
+
+
 @register_jitable
-def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-untyped-def]
+def _goal(pose, approach, follow):  # type: ignore[no-untyped-def]
     """Computes the moving goal that the control point P should reach.
 
-    The goal lies in the direction of the target, or toward a point of the route if the
-    route is a detour. Its distance and velocity make P approach with the wanted speed.
+    The goal lies in the direction of the local goal on the route. Its distance and
+    velocity make P approach with the wanted speed.
 
     Returns:
         Position (x, y), m, and velocity (vx, vy), m/s, of the goal in the world frame
         W.
     """
-    ahead = numbers.follow.control_point_m
-    px, py = at[0] + ahead * math.cos(at[2]), at[1] + ahead * math.sin(at[2])
-    if not valid:
-        return px, py, 0.0, 0.0
-    follow = numbers.follow
-    clear = np.array([[target[0], target[1], SOURCE_CLEARANCE_M]])
-    start = at[0], at[1]
-    find_way(way, space, start, target, 0.0, numbers.radius_m, clear)
-    straight = math.hypot(target[0] - px, target[1] - py)
-    left = straight
-    carrot = target
-    if way.length_m[0] > _DETOUR * math.hypot(target[0] - at[0], target[1] - at[1]):
-        left = max(straight, way.length_m[0] - ahead)
-        carrot = find_carrot(way, at[0], at[1], _LOOK_AHEAD_M)
-    dx, dy = carrot[0] - px, carrot[1] - py
+    ahead = follow.control_point_m
+    px, py = pose[0] + ahead * math.cos(pose[2]), pose[1] + ahead * math.sin(pose[2])
+    dx, dy = approach.x - px, approach.y - py
     far = max(math.hypot(dx, dy), 1e-9)
     ux, uy = dx / far, dy / far
-    along = speed[0] * ux + speed[1] * uy
-    goes = wanted_speed(left - follow.distance_m, along)
+    goes, along = approach.speed_m_s, approach.along_m_s
     moves = min(SOURCE_SHARE * along, goes) if goes > 0.0 else 0.0
     rest = (goes - moves) / APPROACH_GAIN
     return px + rest * ux, py + rest * uy, moves * ux, moves * uy
@@ -327,8 +335,9 @@ class PathIntegralController(MapController):
 
     Ten times per second, the block makes a new plan in three stages:
 
-    1. It plans a route to the target on the map. In the direction of the route, it
-       places a goal that moves with at most 80 % of the speed of the target.
+    1. It places a goal in the direction of its route to the target. The goal moves with
+       at most 80 % of the speed of the target. If the direction is far off the heading,
+       the robot first turns on the spot, as with the rotation shim of Nav2.
     2. It draws 500 random sequences of 2.5 s around the previous plan, and computes the
        cost of each. The cost depends on the distance and direction of the goal, on
        driving backward, and on occupied cells near the body.
@@ -362,10 +371,12 @@ class PathIntegralController(MapController):
     ) -> None:
         super().__init__()
         self.set_name("path_integral_controller")
+        length, width = half_size(robot)
+        follow = FollowNumbers(attraction.follow_distance_m, robot.control_point_m)
         numbers = PathIntegralNumbers(
             _roll_numbers(gains, robot),
-            FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
-            body_radius(robot) + gains.clearance_m,
+            route_numbers(follow, width + gains.clearance_m, tick_s),
+            (length + gains.clearance_m, width + gains.clearance_m),
             max(round(_STEP_S / tick_s), 1),
             _noise(seed),
         )
@@ -380,18 +391,41 @@ class PathIntegralController(MapController):
 
 
 def _roll_numbers(gains: PathIntegralParameters, robot: RobotParameters) -> RollNumbers:
-    length, width = half_size(robot)
-    # Each disc covers a third of the width.
-    part = width / _DISCS
+    discs, radius = covering_discs(*half_size(robot))
     return RollNumbers(
         gains.turn_spread_rad_s,
         gains.temperature,
         gains.angle_gain,
         gains.obstacle_gain,
         gains.inflation_m,
-        (2.0 * part, math.hypot(length, part) + gains.clearance_m),
+        discs,
+        radius + gains.clearance_m,
         robot.control_point_m,
     )
+
+
+def covering_discs(
+    half_length: float, half_width: float
+) -> tuple[NDArray[np.float64], float]:
+    """Covers a rectangle by equal discs in a row along its longer side.
+
+    The discs extend beyond the sides by at most 6 % of the shorter side.
+
+    Args:
+        half_length: Half of the extent along x, m.
+        half_width: Half of the extent along y, m.
+
+    Returns:
+        (n, 2) middles of the discs, m, relative to the middle of the rectangle, and the
+        radius of the discs, m.
+    """
+    longer, shorter = max(half_length, half_width), min(half_length, half_width)
+    count = math.ceil(2.0 * longer / shorter)
+    part = longer / count
+    row = part * (2.0 * np.arange(count) - count + 1.0)
+    discs = np.zeros((count, 2))
+    discs[:, 0 if half_length >= half_width else 1] = row
+    return discs, math.hypot(part, shorter)
 
 
 def _noise(seed: int) -> NDArray[np.float64]:
