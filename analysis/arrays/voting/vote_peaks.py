@@ -40,7 +40,9 @@ _LEAST_SHARE = 0.17
 # _OF_BINS: exponent of the density of single bins in the geometric mean.
 # _ANYWHERE: share of each density that is spread over all directions. It preserves a
 #   source that has few votes in one of the two densities.
-_OF_BINS, _ANYWHERE = 0.6, 0.1
+# _OF_SHARE: exponent of the share in the votes of single bins, in the geometric mean
+#   with the share in the steered votes.
+_OF_BINS, _ANYWHERE, _OF_SHARE = 0.6, 0.1, 0.4
 
 # Least number of single bins that vote for a source.
 _LEAST_VOTES = 15.0
@@ -85,7 +87,8 @@ class VotedSource(NamedTuple):
     """Scatter of the elevations of the votes, rad. Errors in common do not average out,
     so it is that of one vote."""
     share: float
-    """Share of the total weight of all votes, 0 to 1."""
+    """Share of the total weight of all votes, 0 to 1. If both kinds of votes decide, it
+    is a geometric mean of the shares in both."""
     power: float
     """Sum of the A-weighted power of its votes."""
     rises: float
@@ -139,6 +142,7 @@ def gather_sources(
     used = used.part(level, slice(0))
     steered = steered.part(without_steep(steered.elevation), slice(0))
     if used.azimuth.size:
+        agree &= steered.azimuth.size > 0
         found += _level_sources(used, steered if agree else None, whole, least)
     found = [source for source in found if source.votes >= least]
     most = max((source.share for source in found), default=0.0)
@@ -211,7 +215,7 @@ def _level_sources(
     """Finds the sources that are not steep, from votes and from steered votes."""
     azimuth, weight = votes.azimuth, votes.weight
     density, centers = _density(azimuth, weight)
-    if steered is not None and steered.azimuth.size:
+    if steered is not None:
         other, _ = _density(steered.azimuth, steered.weight)
         density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
     peaks = _peaks(density)
@@ -273,6 +277,9 @@ def _source(
     if not mine.any():
         return None
     found = voted_bearing(votes.part(mine, slice(0)), steered, bearing)
+    share = float(weight[mine].sum()) / whole
+    if steered is not None:
+        share = share**_OF_SHARE * _steered_share(steered, bearing) ** (1.0 - _OF_SHARE)
     heights = votes.elevation[mine]
     measured = bool(np.isfinite(heights).all())
     return VotedSource(
@@ -280,13 +287,24 @@ def _source(
         bearing_std=found.std,
         elevation=float(np.median(heights)) if measured else None,
         elevation_std=_scatter(heights) if measured else None,
-        share=float(weight[mine].sum()) / whole,
+        share=share,
         power=float(votes.power[mine].sum()),
         rises=float(votes.rises[mine].mean()),
         votes=count,
         confidence=0.0,
         common_std=found.common_std,
     )
+
+
+def _steered_share(steered: DirectionVotes, bearing: float) -> float:
+    """Returns the share of the steered votes that are near a bearing.
+
+    A reflection that interferes with the direct sound turns the votes of single bins,
+    even of many if few pairs of microphones check them. The steered response joins all
+    frequencies, so its votes stay with the source.
+    """
+    near = np.abs(wrapped(steered.azimuth - bearing)) < NEAR_RAD
+    return float(steered.weight[near].sum() / steered.weight.sum())
 
 
 def _scatter(angles: NDArray[np.float64]) -> float:
