@@ -11,6 +11,7 @@ installed. It computes rays without width, gets a fixed command, and has no law.
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import tempfile
 from importlib.util import find_spec
@@ -19,7 +20,6 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-import yaml
 
 from diagrams.running.compiled.loop import compile_loop
 from diagrams.scenario.scenario import scenario_from_mapping
@@ -134,7 +134,7 @@ def irsim_steps_per_second(count: int) -> float:
     }
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "world.yaml")
-        file.write_text(yaml.safe_dump(world))
+        file.write_text(json.dumps(world))
         env = irsim.make(str(file), display=False, save_ani=False, log_level="ERROR")
     command, steps, begin = np.array([[0.2], [0.0]]), 0, process_time()
     while process_time() - begin < REPEATS:
