@@ -61,7 +61,7 @@ package: .venv/.installed-dev ## build the package, and use it where the sources
 
 bench: .venv/.installed ## measure speed, memory and the time a frame takes to hear
 	@$(PY) -m benchmarks
-	@echo "More: $(PY) -m benchmarks.listen, .several_robots, .sweeps (minutes each)"
+	@echo "More: $(PY) -m benchmarks.beams, .listen, .several_robots, .sweeps (minutes each)"
 
 attack: .venv/.installed ## give the command line thousands of bad inputs
 	@$(PY) -m tests.fuzz.attack

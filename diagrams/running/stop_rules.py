@@ -382,18 +382,26 @@ def _first_touched(
     """
     bodies, parts = numbers.bodies, numbers.bodies.parts
     pose, before = state.now[numbers.robot], state.before[numbers.robot]
-    gone = math.hypot(pose[0] - before[0], pose[1] - before[1])
+    x, y = pose[0], pose[1]
+    gone = math.hypot(x - before[0], y - before[1])
     touched, first = -1, np.inf
     for row in range(len(bodies.reach)):
-        robot, step = bodies.robots[row], bodies.steps[row]
-        now = _pose_of(row, tick, state, bodies)
-        then = state.before[max(robot, 0)]
+        # Whole rows of arrays would take most of the time of a world of many bodies.
+        robot, near = bodies.robots[row], bodies.reach[row] + gone
         if robot >= 0:
-            step = math.hypot(now[0] - then[0], now[1] - then[1])
-        near = bodies.reach[row] + gone + step
-        if math.hypot(now[0] - pose[0], now[1] - pose[1]) > near:
+            dx, dy = state.now[robot, 0] - x, state.now[robot, 1] - y
+            near += math.hypot(
+                state.now[robot, 0] - state.before[robot, 0],
+                state.now[robot, 1] - state.before[robot, 1],
+            )
+        else:
+            at = bodies.rows[row, 0] + bodies.rows[row, 1] * tick
+            dx, dy = bodies.poses[at, 0] - x, bodies.poses[at, 1] - y
+            near += bodies.steps[row]
+        if near < 0.0 or dx * dx + dy * dy > near * near:
             continue
         if robot >= 0:
+            then, now = state.before[robot], state.now[robot]
             poses = np.empty((parts + 1, 3))
             for k in range(parts + 1):
                 for j in range(3):

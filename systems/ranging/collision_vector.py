@@ -311,6 +311,8 @@ def collision_step(
     ranges, echo, ages, pose = inputs
     points = [
         echo_point(ranges[k], numbers.axes[k], numbers.places[k])
+        if echo[k] > 0.5
+        else (0.0 * ranges[k], 0.0 * ranges[k])
         for k in range(len(ranges))
     ]
     if len(state):

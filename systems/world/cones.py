@@ -295,8 +295,8 @@ def _see_rectangle(
 ) -> None:
     """Reduces the ranges of the sensors of a fan at ``at`` that see a rectangle.
 
-    ``cone`` has the tangent of half of the opening angle, and half of the opening
-    angle, rad. ``circle`` is the circle around the rectangle: direction of its center in W, rad,
+    ``cone`` has the tangent of half of the opening angle, and this half angle, rad.
+    ``circle`` is the circle around the rectangle: direction of its center in W, rad,
     distance of its center from the fan, m, and radius, m.
     """
     begin, end, axes, theta, cosines, sines = fan

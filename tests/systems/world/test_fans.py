@@ -59,5 +59,5 @@ def test_a_fan_measures_what_its_sensors_measure_alone(kind, reach_m):
         near = alone <= reach_m
         np.testing.assert_array_equal(found[near], alone[near])
         assert (found[~near] > reach_m).all()
-        hits += np.count_nonzero(np.isfinite(alone) & (alone > 0.0))
+        hits += int(np.count_nonzero(np.isfinite(alone) & (alone > 0.0)))
     assert hits > 200
