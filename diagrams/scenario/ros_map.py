@@ -262,7 +262,8 @@ def _origin(content: Mapping[str, Any], field: str) -> tuple[float, float, float
 
 
 def _number(content: Mapping[str, Any], key: str, field: str) -> float:
-    if not _is_number(value := content.get(key)):
+    value: Any = content.get(key)
+    if not _is_number(value):
         raise _fault(field, key, value, "give a number")
     return float(value)
 
