@@ -72,6 +72,13 @@ class DiskMargin:
     frequency_rad_s: float
     """Frequency at which the smallest destabilizing factor acts, rad/s."""
 
+    def __str__(self) -> str:
+        """Size of the disk, and the changes of gain or phase that it permits."""
+        return (
+            f"alpha {self.alpha:.4g}, skew {self.skew:g}: gain {self.gain_low:.4g} to "
+            f"{self.gain_high:.4g}, phase {self.phase_margin_deg:.4g} deg"
+        )
+
     def to_dict(self) -> dict[str, float]:
         """Values for the JSON document."""
         names = (
@@ -178,8 +185,7 @@ class LoopMargins:
             f"at {self.modulus_frequency_rad_s:.4g} rad/s",
             "peaks": f"M_s {self.sensitivity_peak:.4g}, "
             f"M_t {self.complementary_peak:.4g}",
-            "disk": f"alpha {self.disk.alpha:.4g}: {self.disk.gain_margin_db:.4g} dB "
-            f"and {self.disk.phase_margin_deg:.4g} deg",
+            "disk": str(self.disk),
         }
         return "\n".join([f"{self.name}: the closed loop is stable", *_aligned(rows)])
 

@@ -35,6 +35,8 @@ def test_a_textbook_loop():
         r"^gain +3\.6\d* \(\+11\.1\d* dB\) up, no limit down$", str(found), re.MULTILINE
     )
     assert re.search(r"^phase +29\.1\d* deg lag, ", str(found), re.MULTILINE)
+    # The gains (2 + alpha) / (2 - alpha) and its inverse.
+    assert re.match(r"alpha 0\.458\d*, skew 0: gain 0\.62\d* to 1\.59", str(disk))
     unstable = phonotaxis.margins(control.tf([100.0], [1.0, 10.0, 10.0, 10.0]))
     assert str(unstable).endswith("the closed loop is unstable")
 
