@@ -13,10 +13,11 @@ from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.laws.baselines.baseline_controller import MapController, occupied_around
+from systems.laws.baselines.baseline_controller import MapController
 from systems.laws.parameters import AttractionParameters
 from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
-from systems.planning.following import FollowNumbers, approach
+from systems.planning.following import FollowNumbers, approach, left_to_target
+from systems.planning.occupied import SOURCE_CLEARANCE_M, list_occupied
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
 # ``_SECTORS``: number of sectors of the histogram (5 deg each, as in the paper).
@@ -26,6 +27,8 @@ _SECTORS, _WIDE = 72, 16
 #   paper).
 # ``_HEADING_GAIN``: weight mu_2 of the angle to the robot's heading (as in the paper).
 _TARGET_GAIN, _HEADING_GAIN = 5.0, 2.0
+#: Distance within which cells count, in radii of the body's disc.
+_WINDOW_RADII = 2.5
 #: Ratio of the high threshold of the density to the low threshold.
 _THRESHOLDS_RATIO = 2.0
 #: Value of the direction if no direction was chosen.
@@ -240,6 +243,30 @@ def _steer(
 
 
 @register_jitable
+def _cells_ahead(inputs, numbers):  # type: ignore[no-untyped-def]
+    """Lists the occupied cells that the body could meet on its way to the target.
+
+    These are the cells within the window and nearer than the place where the robot
+    wants to rest. Behind this place, a wall does not block the way. Cells near the
+    target belong to the target.
+    """
+    target, pose, histogram = inputs[0], inputs[3], numbers.histogram
+    reach = histogram.window_m
+    if inputs[2][0] > 0.5:
+        left = max(left_to_target(target, pose, numbers.follow), 0.0)
+        reach = min(reach, left + histogram.radius_m)
+    clear = target[0], target[1], SOURCE_CLEARANCE_M
+    cells = list_occupied(inputs[4], pose[0], pose[1], reach, clear)
+    near, count = np.empty(cells.shape), 0
+    for n in range(len(cells)):
+        dx, dy = cells[n, 0] - pose[0], cells[n, 1] - pose[1]
+        if dx * dx + dy * dy <= reach * reach:
+            near[count] = cells[n]
+            count += 1
+    return near[:count]
+
+
+@register_jitable
 def vector_field_histogram_step(
     tick: int,
     state: Any,
@@ -254,7 +281,7 @@ def vector_field_histogram_step(
     """
     pose, own, twist = inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
-    places = occupied_around(inputs, own.window_m)
+    places = _cells_ahead(inputs, numbers)
     memory = np.empty(len(state))
     for k in range(len(memory)):
         memory[k] = state[k]
@@ -289,7 +316,8 @@ class VectorFieldHistogramController(MapController):
        present speed.
     4. The block chooses the candidate direction with the least cost.
 
-    The speed falls with the density in the chosen direction, as in an earlier paper
+    A wall behind the place where the robot wants to rest does not count, so that the
+    robot also rests in narrow rooms. The speed falls with the density in the chosen direction, as in an earlier paper
     (Borenstein and Koren 1991). If all directions are blocked, the robot does not drive
     forward, but turns to the target.
 
@@ -316,9 +344,10 @@ class VectorFieldHistogramController(MapController):
     ) -> None:
         super().__init__()
         self.set_name("vector_field_histogram_controller")
+        radius = body_radius(robot)
         histogram = HistogramNumbers(
-            gains.window_m,
-            body_radius(robot) + gains.clearance_m,
+            gains.window_m or _WINDOW_RADII * radius,
+            radius + gains.clearance_m,
             gains.low_threshold,
             gains.previous_gain,
         )
