@@ -135,7 +135,7 @@ def choose_in_window(
     pose: Any,
     now: tuple[float, float],
     speeds: tuple[float, float],
-    goal: tuple[float, float],
+    goal: tuple[float, float, float],
     numbers: WindowNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Chooses speed and yaw rate by the dynamic window approach (Fox, eq. 13-15).
@@ -147,7 +147,7 @@ def choose_in_window(
     terms, each from 0 to 1. The terms reward:
 
     - heading: a small angle between the heading after the motion and the goal
-    - distance: a long way to the first contact, of at most half a circle
+    - distance: a long way to the first contact, up to half a circle and to the goal
     - speed: a speed near the wanted speed
 
     As in the paper, the sum is smoothed: the sum of a motion is the mean over the
@@ -161,7 +161,8 @@ def choose_in_window(
         now: Present speed, m/s, and present yaw rate, rad/s.
         speeds: Least speed, and wanted speed toward the goal, m/s. The wanted speed is
             also the largest speed.
-        goal: Position (x, y) of the local goal in W, m.
+        goal: Position (x, y) of the local goal in W, m, and distance that the robot has
+            to drive to it, m.
         numbers: Weights and limits.
 
     Returns:
@@ -212,14 +213,15 @@ def _value(
     contact: float,
     pose: Any,
     wanted: float,
-    goal: tuple[float, float],
+    goal: tuple[float, float, float],
     numbers: WindowNumbers,
 ) -> float:  # pragma: no cover  (compiled)
     """Computes the weighted sum of heading, distance, and speed of a motion.
 
     ``contact`` is the time to the first contact, s. The distance along an arc is at
-    most half a circle, because the robot would then come back. It counts only for
-    motions that lead forward. The result is positive.
+    most half a circle, because the robot would then come back. Obstacles beyond the goal
+    do not count, and neither does the target itself. Only forward motions have a
+    distance. The result is positive.
     """
     v, w = motion
     heading_gain, distance_gain, speed_gain = numbers.gains
@@ -228,7 +230,7 @@ def _value(
         way = v * contact if contact < np.inf else _REACH_M
         if w != 0.0:
             way = min(way, math.pi * v / abs(w))
-        distance = min(way, _REACH_M) / _REACH_M
+        distance = min(way, goal[2], _REACH_M) / _REACH_M
     # Position after this period, and heading when the robot has stopped its turn.
     middle = pose[2] + 0.5 * w * _PERIOD_S
     x = pose[0] + v * _PERIOD_S * math.cos(middle)
@@ -283,7 +285,7 @@ def dynamic_window_step(
         approach = approach_on_route(tick, inputs, state.way, numbers.route)
         places = occupied_around(inputs, _REACH_M)
         now, at = (motion[0], motion[1]), (pose[0], pose[1], pose[2])
-        goal = approach.x, approach.y
+        goal = approach.x, approach.y, approach.reach_m
         speeds = _wanted_speeds(at, approach)
         motion[0], motion[1] = choose_in_window(
             places, at, now, speeds, goal, numbers.window
@@ -304,11 +306,13 @@ class DynamicWindowController(MapController):
 
     The block differs from the paper in these points:
 
-    - The heading points to the local goal on the route, not to the target.
+    - The heading points to the local goal on the route, not to the target. If the local
+      goal is far off the heading, the robot turns before it drives.
     - The speed term rewards speeds near the wanted speed, because a follower must not
       arrive at full speed.
     - The way to brake contains the way of one period and of the motors' lag.
-    - An arc counts up to half a circle, so that circles do not count as long ways.
+    - The distance along an arc counts up to half a circle and up to the local goal, so
+      that circles do not count as long ways.
     - The obstacles are cells of a map instead of lines. A cell is occupied if an echo
       came from it and no sensor has seen it free since.
 
