@@ -219,8 +219,8 @@ def _value(
     """Computes the weighted sum of heading, distance, and speed of a motion.
 
     ``contact`` is the time to the first contact, s. The distance along an arc is at
-    most half a circle, because the robot would then come back. Obstacles beyond the goal
-    do not count, and neither does the target itself. Only forward motions have a
+    most half a circle, because the robot would then come back. Obstacles beyond the
+    goal do not count, and neither does the target itself. Only forward motions have a
     distance. The result is positive.
     """
     v, w = motion
