@@ -131,7 +131,7 @@ def _braked(
 
 @njit(cache=True)
 def choose_in_window(
-    places: Any,
+    cells: tuple[Any, Any],
     pose: Any,
     now: tuple[float, float],
     speeds: tuple[float, float],
@@ -155,8 +155,8 @@ def choose_in_window(
     the top speed do not count.
 
     Args:
-        places: (n, 3) occupied cells: x and y in the world frame W, m, and the
-            certainty, 0 to 1 (not used).
+        cells: (n, 3) occupied cells of obstacles, and (k, 3) cells of the target: x and
+            y in the world frame W, m, and the certainty, 0 to 1 (not used).
         pose: Pose (x, y, theta) of the axle in W, m and rad.
         now: Present speed, m/s, and present yaw rate, rad/s.
         speeds: Least speed, and wanted speed toward the goal, m/s. The wanted speed is
@@ -178,7 +178,8 @@ def choose_in_window(
     right, left = max(now[1] - dw, -turn), min(now[1] + dw, turn)
     body, kept = numbers.half_size, numbers.clearance_m
     wide = body[0] + kept, body[1] + kept
-    around, near = in_body_axes(places, pose, wide)
+    around, near = in_body_axes(cells[0], pose, wide)
+    near = np.concatenate((near, in_body_axes(cells[1], pose, body)[0]))
     values = np.full((_SPEEDS, _TURNS), np.nan)
     for i in range(_SPEEDS):
         v = _spread(low, high, i, _SPEEDS)
@@ -187,7 +188,7 @@ def choose_in_window(
             if abs(v) + half * abs(w) > top + 1e-9:
                 continue
             # Points outside the clearance must stay outside it. Points already inside
-            # the clearance must stay outside the body.
+            # the clearance, and those of the target, must stay outside the body.
             contact = time_to_contact(around, (v, w), wide)
             contact = min(contact, time_to_contact(near, (v, w), body))
             values[i, j] = 0.0
@@ -283,12 +284,12 @@ def dynamic_window_step(
     pose, motion = inputs[3], state.motion
     if tick % numbers.period_ticks == 0:
         approach = approach_on_route(tick, inputs, state.way, numbers.route)
-        places = occupied_around(inputs, _REACH_M)
+        cells = occupied_around(inputs, _REACH_M)
         now, at = (motion[0], motion[1]), (pose[0], pose[1], pose[2])
         goal = approach.x, approach.y, approach.reach_m
         speeds = _wanted_speeds(at, approach)
         motion[0], motion[1] = choose_in_window(
-            places, at, now, speeds, goal, numbers.window
+            cells, at, now, speeds, goal, numbers.window
         )
     outputs[0][0], outputs[0][1] = motion[0], motion[1]
 

@@ -13,12 +13,16 @@ from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.laws.baselines.baseline_controller import MapController, half_size
+from systems.laws.baselines.baseline_controller import (
+    MapController,
+    half_size,
+    occupied_around,
+    split_at_disc,
+)
 from systems.laws.parameters import AttractionParameters
 from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.body_contact import in_body_axes, time_to_contact
 from systems.planning.following import FollowNumbers, approach, left_to_target
-from systems.planning.occupied import SOURCE_CLEARANCE_M, list_occupied
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
 # ``_SECTORS``: number of sectors of the histogram (5 deg each, as in the paper).
@@ -259,23 +263,12 @@ def _cells_ahead(inputs, numbers):  # type: ignore[no-untyped-def]
         The cells on the way, and the cells of the target near the body.
     """
     target, pose, histogram = inputs[0], inputs[3], numbers.histogram
-    reach, own = histogram.window_m, -1.0
+    reach = histogram.window_m
     if inputs[2][0] > 0.5:
         left = max(left_to_target(target, pose, numbers.follow), 0.0)
-        reach, own = min(reach, left + histogram.radius_m), SOURCE_CLEARANCE_M
-    around = max(reach, 2.0 * histogram.radius_m)
-    cells = list_occupied(inputs[4], pose[0], pose[1], around, (0.0, 0.0, -1.0))
-    ahead, of_target = np.empty(cells.shape), np.empty(cells.shape)
-    count = owned = 0
-    for n in range(len(cells)):
-        x, y = cells[n, 0], cells[n, 1]
-        if math.hypot(x - target[0], y - target[1]) < own:
-            of_target[owned] = cells[n]
-            owned += 1
-        elif math.hypot(x - pose[0], y - pose[1]) <= reach:
-            ahead[count] = cells[n]
-            count += 1
-    return ahead[:count], of_target[:owned]
+        reach = min(reach, left + histogram.radius_m)
+    others, of_target = occupied_around(inputs, max(reach, 2.0 * histogram.radius_m))
+    return split_at_disc(others, (pose[0], pose[1]), reach)[1], of_target
 
 
 @njit(cache=True)

@@ -91,13 +91,20 @@ def test_contacts_are_those_of_small_steps(seed):
 
 def test_it_goes_where_it_is_wanted_when_nothing_is_there():
     """As fast as the window lets it (0.125 m/s in 0.25 s), up to the wanted speed."""
-    motion = choose_in_window(NOTHING, START, (0.3, 0.0), (0.0, 0.6), AHEAD, NUMBERS)
+    motion = choose_in_window(
+        (NOTHING, NOTHING), START, (0.3, 0.0), (0.0, 0.6), AHEAD, NUMBERS
+    )
     assert motion == pytest.approx((0.425, 0.0))
-    motion = choose_in_window(NOTHING, START, (0.3, 0.0), (0.0, 0.35), AHEAD, NUMBERS)
+    motion = choose_in_window(
+        (NOTHING, NOTHING), START, (0.3, 0.0), (0.0, 0.35), AHEAD, NUMBERS
+    )
     assert motion == pytest.approx((0.35, 0.0))
     left = 0.0, 3.0, 2.8
     assert (
-        choose_in_window(NOTHING, START, (0.3, 0.0), (0.0, 0.6), left, NUMBERS)[1] > 0.2
+        choose_in_window(
+            (NOTHING, NOTHING), START, (0.3, 0.0), (0.0, 0.6), left, NUMBERS
+        )[1]
+        > 0.2
     )
 
 
@@ -112,7 +119,7 @@ def driven_to_rest(wall_m, now, lag_s=0.05, tick_s=0.025):
             pose = (x, 0.0, 0.0)
             wall = places(*((wall_m, 0.05 * k) for k in range(-60, 61)))
             command = choose_in_window(
-                wall, pose, (command, 0.0), (0.0, 0.6), AHEAD, NUMBERS
+                (wall, NOTHING), pose, (command, 0.0), (0.0, 0.6), AHEAD, NUMBERS
             )[0]
         v += (command - v) * (1.0 - math.exp(-tick_s / lag_s))
         x += v * tick_s
@@ -133,7 +140,9 @@ def test_an_arc_that_leads_back_is_not_the_longest_way():
     """Nothing is on a small circle, a post is 2 m ahead: it does not circle."""
     post = places(*((2.0, 0.05 * k) for k in range(-60, 61)))
     numbers = NUMBERS._replace(gains=(0.0, 3.0, 0.0))
-    motion = choose_in_window(post, START, (0.3, 0.0), (0.0, 0.6), AHEAD, numbers)
+    motion = choose_in_window(
+        (post, NOTHING), START, (0.3, 0.0), (0.0, 0.6), AHEAD, numbers
+    )
     assert abs(motion[1]) < 0.3
 
 
@@ -141,12 +150,30 @@ def test_what_is_nearer_than_it_keeps_off_is_not_touched():
     """A wall 0.05 m ahead, where 0.1 m are kept: it brakes, 0.125 m/s in a period."""
     numbers = NUMBERS._replace(clearance_m=0.1)
     wall = places(*((0.25, 0.05 * k) for k in range(-60, 61)))
-    v = choose_in_window(wall, START, (0.3, 0.0), (0.0, 0.6), AHEAD, numbers)[0]
+    v = choose_in_window(
+        (wall, NOTHING), START, (0.3, 0.0), (0.0, 0.6), AHEAD, numbers
+    )[0]
     assert v == pytest.approx(0.175)
 
 
+def test_the_target_needs_no_clearance_but_is_not_touched():
+    """A cell 0.08 m ahead: 0.1 m are kept from an obstacle, 0 m from the target."""
+    numbers = NUMBERS._replace(clearance_m=0.1)
+    spot, speeds = places((0.28, 0.0)), (0.0, 0.6)
+    found = [
+        choose_in_window(cells, START, (0.0, 0.0), speeds, AHEAD, numbers)[0]
+        for cells in ((places((0.32, 0.0)), NOTHING), (NOTHING, spot))
+    ]
+    assert found[0] < 0.06
+    assert 0.06 < found[1] < 0.2
+
+
 def test_it_backs_off_only_where_that_is_wanted():
-    rests = choose_in_window(NOTHING, START, (0.0, 0.0), (0.0, 0.0), AHEAD, NUMBERS)
+    rests = choose_in_window(
+        (NOTHING, NOTHING), START, (0.0, 0.0), (0.0, 0.0), AHEAD, NUMBERS
+    )
     assert rests == (0.0, 0.0)
-    back = choose_in_window(NOTHING, START, (0.0, 0.0), (-0.1, -0.1), AHEAD, NUMBERS)
+    back = choose_in_window(
+        (NOTHING, NOTHING), START, (0.0, 0.0), (-0.1, -0.1), AHEAD, NUMBERS
+    )
     assert back[0] == pytest.approx(-0.1)
