@@ -17,9 +17,10 @@ class VectorFieldHistogramParameters(Parameters):
 
     clearance_m: NonNegativeLength = 0.04
     """Distance that the robot keeps from cells with echoes, m."""
-    window_m: Length = 1.1
+    window_m: Length | None = None
     """Distance within which occupied cells count, m. The paper uses 1.65 m, half of the
-    side of its active window."""
+    side of its active window. With null, the distance is 2.5 times the radius of the
+    disc that contains the body."""
     low_threshold: NonNegative = 0.33
     """Density of obstacles below which a sector becomes free. If the density is above
     twice this value, the sector becomes blocked. Between both thresholds, the sector

@@ -45,6 +45,17 @@ def wanted_speed(left: float, along: float) -> float:
 
 
 @register_jitable
+def left_to_target(target: Any, pose: Any, follow: FollowNumbers) -> float:
+    """Computes the distance of P from the target minus the follow distance, m.
+
+    ``target`` is a position (x, y), m, and ``pose`` is that of the robot, m and rad.
+    """
+    px = target[0] - pose[0] - follow.control_point_m * math.cos(pose[2])
+    py = target[1] - pose[1] - follow.control_point_m * math.sin(pose[2])
+    return math.hypot(px, py) - follow.distance_m
+
+
+@register_jitable
 def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
     """Computes the speed and direction of a straight approach to the target.
 
@@ -64,8 +75,5 @@ def approach(inputs: Any, follow: FollowNumbers) -> tuple[float, float]:
         return 0.0, pose[2]
     dx, dy = target[0] - pose[0], target[1] - pose[1]
     bearing = math.atan2(dy, dx)
-    px = dx - follow.control_point_m * math.cos(pose[2])
-    py = dy - follow.control_point_m * math.sin(pose[2])
     along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
-    left = math.hypot(px, py) - follow.distance_m
-    return wanted_speed(left, along), bearing
+    return wanted_speed(left_to_target(target, pose, follow), along), bearing

@@ -49,6 +49,9 @@ class Approach(NamedTuple):
     """Position of the local goal, x in the world frame W, m."""
     y: float
     """Position of the local goal, y in W, m."""
+    reach_m: float
+    """Distance of P from the local goal, or from the place where P rests before the
+    target, m."""
     along_m_s: float
     """Speed of the target in the direction of the local goal."""
 
@@ -80,20 +83,21 @@ def approach_on_route(
     x, y, ahead = pose[0], pose[1], numbers.follow.control_point_m
     px, py = x + ahead * math.cos(pose[2]), y + ahead * math.sin(pose[2])
     if valid[0] < 0.5:
-        return Approach(0.0, px, py, 0.0)
+        return Approach(0.0, px, py, 0.0, 0.0)
     if tick % numbers.replan_ticks == 0 or way.points[0] == 0:
         clear = np.array([[target[0], target[1], SOURCE_CLEARANCE_M]])
         goal = target[0], target[1]
         find_way(way, space, (x, y), goal, 0.0, numbers.radius_m, clear)
     gx, gy = find_carrot(way, x, y, _LOOK_AHEAD_M)
     straight = math.hypot(target[0] - px, target[1] - py)
-    left = max(straight, way.length_m[0] - ahead)
+    left = max(straight, way.length_m[0] - ahead) - numbers.follow.distance_m
+    reach = math.hypot(gx - px, gy - py)
     # The last point of the route is the middle of the target's cell.
     last = way.path[way.points[0] - 1]
     near = math.hypot(gx - target[0], gy - target[1]) < SOURCE_CLEARANCE_M
     if near and gx == last[0] and gy == last[1]:
-        gx, gy, left = target[0], target[1], straight
+        gx, gy, left = target[0], target[1], straight - numbers.follow.distance_m
+        reach = max(left, 0.0)
     bearing = math.atan2(gy - y, gx - x)
     along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
-    speed = wanted_speed(left - numbers.follow.distance_m, along)
-    return Approach(speed, gx, gy, along)
+    return Approach(wanted_speed(left, along), gx, gy, reach, along)

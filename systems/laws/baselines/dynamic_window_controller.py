@@ -131,11 +131,11 @@ def _braked(
 
 @njit(cache=True)
 def choose_in_window(
-    places: Any,
+    cells: tuple[Any, Any],
     pose: Any,
     now: tuple[float, float],
     speeds: tuple[float, float],
-    goal: tuple[float, float],
+    goal: tuple[float, float, float],
     numbers: WindowNumbers,
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Chooses speed and yaw rate by the dynamic window approach (Fox, eq. 13-15).
@@ -147,7 +147,7 @@ def choose_in_window(
     terms, each from 0 to 1. The terms reward:
 
     - heading: a small angle between the heading after the motion and the goal
-    - distance: a long way to the first contact, of at most half a circle
+    - distance: a long way to the first contact, up to half a circle and to the goal
     - speed: a speed near the wanted speed
 
     As in the paper, the sum is smoothed: the sum of a motion is the mean over the
@@ -155,13 +155,14 @@ def choose_in_window(
     the top speed do not count.
 
     Args:
-        places: (n, 3) occupied cells: x and y in the world frame W, m, and the
-            certainty, 0 to 1 (not used).
+        cells: (n, 3) occupied cells of obstacles, and (k, 3) cells of the target: x and
+            y in the world frame W, m, and the certainty, 0 to 1 (not used).
         pose: Pose (x, y, theta) of the axle in W, m and rad.
         now: Present speed, m/s, and present yaw rate, rad/s.
         speeds: Least speed, and wanted speed toward the goal, m/s. The wanted speed is
             also the largest speed.
-        goal: Position (x, y) of the local goal in W, m.
+        goal: Position (x, y) of the local goal in W, m, and distance that the robot has
+            to drive to it, m.
         numbers: Weights and limits.
 
     Returns:
@@ -177,7 +178,8 @@ def choose_in_window(
     right, left = max(now[1] - dw, -turn), min(now[1] + dw, turn)
     body, kept = numbers.half_size, numbers.clearance_m
     wide = body[0] + kept, body[1] + kept
-    around, near = in_body_axes(places, pose, wide)
+    around, near = in_body_axes(cells[0], pose, wide)
+    near = np.concatenate((near, in_body_axes(cells[1], pose, body)[0]))
     values = np.full((_SPEEDS, _TURNS), np.nan)
     for i in range(_SPEEDS):
         v = _spread(low, high, i, _SPEEDS)
@@ -186,7 +188,7 @@ def choose_in_window(
             if abs(v) + half * abs(w) > top + 1e-9:
                 continue
             # Points outside the clearance must stay outside it. Points already inside
-            # the clearance must stay outside the body.
+            # the clearance, and those of the target, must stay outside the body.
             contact = time_to_contact(around, (v, w), wide)
             contact = min(contact, time_to_contact(near, (v, w), body))
             values[i, j] = 0.0
@@ -212,14 +214,15 @@ def _value(
     contact: float,
     pose: Any,
     wanted: float,
-    goal: tuple[float, float],
+    goal: tuple[float, float, float],
     numbers: WindowNumbers,
 ) -> float:  # pragma: no cover  (compiled)
     """Computes the weighted sum of heading, distance, and speed of a motion.
 
     ``contact`` is the time to the first contact, s. The distance along an arc is at
-    most half a circle, because the robot would then come back. It counts only for
-    motions that lead forward. The result is positive.
+    most half a circle, because the robot would then come back. Obstacles beyond the
+    goal do not count, and neither does the target itself. Only forward motions have a
+    distance. The result is positive.
     """
     v, w = motion
     heading_gain, distance_gain, speed_gain = numbers.gains
@@ -228,7 +231,7 @@ def _value(
         way = v * contact if contact < np.inf else _REACH_M
         if w != 0.0:
             way = min(way, math.pi * v / abs(w))
-        distance = min(way, _REACH_M) / _REACH_M
+        distance = min(way, goal[2], _REACH_M) / _REACH_M
     # Position after this period, and heading when the robot has stopped its turn.
     middle = pose[2] + 0.5 * w * _PERIOD_S
     x = pose[0] + v * _PERIOD_S * math.cos(middle)
@@ -281,12 +284,12 @@ def dynamic_window_step(
     pose, motion = inputs[3], state.motion
     if tick % numbers.period_ticks == 0:
         approach = approach_on_route(tick, inputs, state.way, numbers.route)
-        places = occupied_around(inputs, _REACH_M)
+        cells = occupied_around(inputs, _REACH_M)
         now, at = (motion[0], motion[1]), (pose[0], pose[1], pose[2])
-        goal = approach.x, approach.y
+        goal = approach.x, approach.y, approach.reach_m
         speeds = _wanted_speeds(at, approach)
         motion[0], motion[1] = choose_in_window(
-            places, at, now, speeds, goal, numbers.window
+            cells, at, now, speeds, goal, numbers.window
         )
     outputs[0][0], outputs[0][1] = motion[0], motion[1]
 
@@ -304,11 +307,13 @@ class DynamicWindowController(MapController):
 
     The block differs from the paper in these points:
 
-    - The heading points to the local goal on the route, not to the target.
+    - The heading points to the local goal on the route, not to the target. If the local
+      goal is far off the heading, the robot turns before it drives.
     - The speed term rewards speeds near the wanted speed, because a follower must not
       arrive at full speed.
     - The way to brake contains the way of one period and of the motors' lag.
-    - An arc counts up to half a circle, so that circles do not count as long ways.
+    - The distance along an arc counts up to half a circle and up to the local goal, so
+      that circles do not count as long ways.
     - The obstacles are cells of a map instead of lines. A cell is occupied if an echo
       came from it and no sensor has seen it free since.
 

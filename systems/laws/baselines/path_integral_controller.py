@@ -269,7 +269,7 @@ def path_integral_step(
         controls = np.zeros((steps, 2))
         approach = approach_on_route(tick, inputs, state.way, numbers.route)
         at = pose[0], pose[1], pose[2]
-        places = occupied_around(inputs, _WINDOW_M)
+        places = np.concatenate(occupied_around(inputs, _WINDOW_M))
         turn = _turn_first(places, at, approach, numbers.wide)
         if turn != 0.0:
             controls[0, 1] = turn

@@ -13,10 +13,16 @@ from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.laws.baselines.baseline_controller import MapController, occupied_around
+from systems.laws.baselines.baseline_controller import (
+    MapController,
+    half_size,
+    occupied_around,
+    split_at_disc,
+)
 from systems.laws.parameters import AttractionParameters
 from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
-from systems.planning.following import FollowNumbers, approach
+from systems.planning.body_contact import in_body_axes, time_to_contact
+from systems.planning.following import FollowNumbers, approach, left_to_target
 from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
 
 # ``_SECTORS``: number of sectors of the histogram (5 deg each, as in the paper).
@@ -26,6 +32,10 @@ _SECTORS, _WIDE = 72, 16
 #   paper).
 # ``_HEADING_GAIN``: weight mu_2 of the angle to the robot's heading (as in the paper).
 _TARGET_GAIN, _HEADING_GAIN = 5.0, 2.0
+#: Time within which the robot must not touch the target, s.
+_SOON_S = 0.3
+#: Distance within which cells count, in radii of the body's disc.
+_WINDOW_RADII = 2.5
 #: Ratio of the high threshold of the density to the low threshold.
 _THRESHOLDS_RATIO = 2.0
 #: Value of the direction if no direction was chosen.
@@ -48,6 +58,8 @@ class VectorFieldHistogramNumbers(NamedTuple):
     own: VectorFieldHistogramParameters
     histogram: HistogramNumbers
     follow: FollowNumbers
+    half_size: tuple[float, float]
+    """Half of the body's length and width, m."""
 
 
 @njit(cache=True)
@@ -240,6 +252,45 @@ def _steer(
 
 
 @register_jitable
+def _cells_ahead(inputs, numbers):  # type: ignore[no-untyped-def]
+    """Lists the occupied cells that the body could meet on its way to the target.
+
+    These are the cells within the window and nearer than the place where the robot
+    wants to rest. Behind this place, a wall does not block the way. Cells near the
+    target belong to the target.
+
+    Returns:
+        The cells on the way, and the cells of the target near the body.
+    """
+    target, pose, histogram = inputs[0], inputs[3], numbers.histogram
+    reach = histogram.window_m
+    if inputs[2][0] > 0.5:
+        left = max(left_to_target(target, pose, numbers.follow), 0.0)
+        reach = min(reach, left + histogram.radius_m)
+    others, of_target = occupied_around(inputs, max(reach, 2.0 * histogram.radius_m))
+    return split_at_disc(others, (pose[0], pose[1]), reach)[1], of_target
+
+
+@njit(cache=True)
+def _off_target(
+    twist: tuple[float, float], cells: Any, pose: Any, half: tuple[float, float]
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Stops a motion that would soon touch the target.
+
+    ``twist`` is the speed, m/s, and the yaw rate, rad/s. ``cells`` are those of the
+    target. If the body would touch one of them within ``_SOON_S``, the robot does not
+    turn. If it still would, the robot does not drive.
+    """
+    around, _ = in_body_axes(cells, pose, half)
+    v, w = twist
+    if time_to_contact(around, (v, w), half) < _SOON_S:
+        w = 0.0
+        if time_to_contact(around, (v, w), half) < _SOON_S:
+            v = 0.0
+    return v, w
+
+
+@register_jitable
 def vector_field_histogram_step(
     tick: int,
     state: Any,
@@ -254,7 +305,7 @@ def vector_field_histogram_step(
     """
     pose, own, twist = inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
-    places = occupied_around(inputs, own.window_m)
+    places, of_target = _cells_ahead(inputs, numbers)
     memory = np.empty(len(state))
     for k in range(len(memory)):
         memory[k] = state[k]
@@ -267,7 +318,8 @@ def vector_field_histogram_step(
         wanted, direction = min(wanted, 0.0), bearing
     elif wanted > 0.0:
         wanted *= max(1.0 - density / own.slow_density, 0.0)
-    twist[0], twist[1] = turn_towards(wanted, direction, pose[2])
+    motion = turn_towards(wanted, direction, pose[2])
+    twist[0], twist[1] = _off_target(motion, of_target, at, numbers.half_size)
     memory[_SECTORS + 1] = twist[0]
     for k in range(len(memory)):
         state[k] = memory[k]
@@ -289,9 +341,11 @@ class VectorFieldHistogramController(MapController):
        present speed.
     4. The block chooses the candidate direction with the least cost.
 
-    The speed falls with the density in the chosen direction, as in an earlier paper
-    (Borenstein and Koren 1991). If all directions are blocked, the robot does not drive
-    forward, but turns to the target.
+    Cells behind the place where the robot wants to rest do not count, so that the robot
+    also rests in narrow rooms. The speed falls with the density in the chosen
+    direction, as in an earlier paper (Borenstein and Koren 1991). If all directions are
+    blocked, the robot does not drive forward, but turns to the target. It stops before
+    it touches the target.
 
     The discrete state contains the blocked sectors, the previous direction, and the
     previous speed. There is no latency.
@@ -316,9 +370,10 @@ class VectorFieldHistogramController(MapController):
     ) -> None:
         super().__init__()
         self.set_name("vector_field_histogram_controller")
+        radius = body_radius(robot)
         histogram = HistogramNumbers(
-            gains.window_m,
-            body_radius(robot) + gains.clearance_m,
+            gains.window_m or _WINDOW_RADII * radius,
+            radius + gains.clearance_m,
             gains.low_threshold,
             gains.previous_gain,
         )
@@ -326,6 +381,7 @@ class VectorFieldHistogramController(MapController):
             gains,
             histogram,
             FollowNumbers(attraction.follow_distance_m, robot.control_point_m),
+            half_size(robot),
         )
         state = [*[0.0] * _SECTORS, _NONE, 0.0]
         self.declare(Step(vector_field_histogram_step, numbers, state), tick_s=tick_s)

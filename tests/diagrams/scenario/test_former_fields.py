@@ -94,7 +94,7 @@ def test_a_map_without_a_guard_makes_no_guard(tmp_path):
 @pytest.mark.parametrize("robot", ["", "robots.a."])
 def test_another_value_than_the_constant_is_refused(robot):
     field = f"{robot}repulsion.dwa.period_s"
-    with pytest.raises(InputError, match=r"^.*period_s: is 0.2.*_PERIOD_S = 0.1"):
+    with pytest.raises(InputError, match=r"^.*period_s: is 0.2.*_PERIOD_S = 0.25"):
         load_scenario("default", {field: 0.2})
     with pytest.raises(InputError, match=r"^tdoa.maximum_misfit: is 0.1"):
         load_scenario("default", {"tdoa.maximum_misfit": 0.1})

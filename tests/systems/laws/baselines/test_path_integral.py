@@ -9,10 +9,13 @@ from scipy.ndimage import distance_transform_edt
 from systems.base.robot import RobotParameters
 from systems.laws.baselines.path_integral_controller import (
     _roll_numbers,
+    _turn_first,
+    covering_discs,
     distance_field,
     roll_out,
 )
 from systems.laws.path_integral import PathIntegralParameters
+from systems.planning.route_approach import Approach
 
 CELL_M = 0.05
 START = 0.0, 0.0, 0.0
@@ -97,12 +100,26 @@ def test_it_does_not_drive_into_a_wall():
     assert stopped[:, 0].sum() * 0.1 < 0.6 - 0.175
 
 
-@pytest.mark.parametrize("width", [0.3, 0.82, 1.4])
-def test_discs_cover_the_body(width):
-    robot = RobotParameters(width_m=width)
-    own = PathIntegralParameters(clearance_m=0.0)
-    aside, radius = _roll_numbers(own, robot).discs
-    x, y = np.meshgrid(np.linspace(-0.175, 0.175, 9), np.linspace(-0.5, 0.5, 41))
-    y = y * width
-    near = [np.hypot(x, y - aside * k) <= radius + 1e-9 for k in (-1, 0, 1)]
-    assert np.logical_or.reduce(near).all()
+@pytest.mark.parametrize("half", [(0.175, 0.41), (0.6, 0.25), (0.25, 0.25), (0.1, 0.7)])
+def test_discs_cover_the_body_and_little_more(half):
+    """Each point is in a disc, and the discs are at most 12 % wider than the body."""
+    discs, radius = covering_discs(*half)
+    grid = np.meshgrid(*(side * np.linspace(-1.0, 1.0, 41) for side in half))
+    points = np.column_stack([axis.ravel() for axis in grid])
+    far = np.linalg.norm(points[:, None] - discs[None], axis=2).min(axis=1)
+    assert (far <= radius + 1e-9).all()
+    assert radius <= 1.12 * min(half)
+
+
+def test_it_turns_on_the_spot_to_what_is_behind_it():
+    """A corridor 1.2 m wide, the diagonal of the body is 0.89 m (Nav2, issue 4049)."""
+    approach = Approach(0.6, -1.5, 0.0, 1.5, 0.0)
+    wide = 0.205, 0.44
+    corridor = np.array(
+        [(0.05 * k, y, 1.0) for k in range(-40, 41) for y in (-0.6, 0.6)]
+    )
+    assert abs(_turn_first(corridor, START, approach, wide)) == pytest.approx(2.0)
+    narrow = corridor * (1.0, 0.78, 1.0)
+    assert _turn_first(narrow, START, approach, wide) == 0.0
+    ahead = approach._replace(x=1.5)
+    assert _turn_first(corridor, START, ahead, wide) == 0.0
