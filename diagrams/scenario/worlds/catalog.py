@@ -11,6 +11,7 @@ from diagrams.scenario.shorthand import joined
 from diagrams.scenario.suggestions import did_you_mean
 from diagrams.scenario.worlds.cylinder_tables import CYLINDERS, PATHS, read_tables
 from diagrams.scenario.worlds.gazebo_worlds import gazebo_worlds, path_file
+from diagrams.scenario.worlds.map_tests import MAP, TESTS, map_tests
 from diagrams.scenario.worlds.world import World
 from systems.framework.input_error import InputError
 
@@ -23,8 +24,8 @@ def open_worlds(source: str | Path) -> dict[str, Callable[[], World]]:
     """Lists the worlds of a set, without reading all of them.
 
     Args:
-        source: ``shipped``, or a folder with ``cylinders.csv`` and ``paths.csv``, or
-            with ``world_N.world``.
+        source: ``shipped``, or a folder with ``cylinders.csv`` and ``paths.csv``, with
+            ``world_N.world``, or with folders of maps.
 
     Returns:
         A function that reads each world, by name of the world, in order.
@@ -37,13 +38,13 @@ def open_worlds(source: str | Path) -> dict[str, Callable[[], World]]:
         stamps = tuple(_stamp(folder / name) for name in (CYLINDERS, PATHS))
         worlds = _tables(folder, stamps)
         return {name: lambda world=world: world for name, world in worlds.items()}
-    if folder.is_dir() and (found := gazebo_worlds(folder)):
+    if folder.is_dir() and (found := gazebo_worlds(folder) or map_tests(folder)):
         return found
     what = "has no" if folder.is_dir() else "is no folder with"
     raise InputError(
         "worlds",
-        f"{source} {what} {CYLINDERS} or world_0.world; give the folder that has them, "
-        f"or {SHIPPED!r}",
+        f"{source} {what} {CYLINDERS}, world_0.world, or maps with "
+        f"{TESTS}; give the folder that has them, or {SHIPPED!r}",
     )
 
 
@@ -55,7 +56,9 @@ def world_files(text: Any, folder: Path) -> list[Path]:
         return [root / CYLINDERS, root / PATHS]
     files = [root / f"world_{name}.{ending}" for ending in ("world", "sdf")]
     paths = [path_file(file) for file in files]
-    return [*files, *(path for path in paths if path)]
+    maps = [root, root / name.rpartition("_")[0]]
+    tests = [place / file for place in maps for file in (MAP, TESTS)]
+    return [*files, *(path for path in paths if path), *tests]
 
 
 def find_world(text: Any, folder: Path) -> World:

@@ -25,6 +25,8 @@ class World:
     goal_m: tuple[float, float] = GOAL_M
     path_length_m: float | None = None
     """Length of the reference path from start to goal. None: not known."""
+    map_file: str | None = None
+    """Full path of a map with further obstacles, see ``map.file`` of a scenario."""
 
     def fields(self, *, routed: bool) -> dict[str, Any]:
         """Returns the fields of a scenario that the world determines.
@@ -47,6 +49,7 @@ class World:
                 "heading_deg": self.heading_deg,
             },
             **target,
+            "map": None if self.map_file is None else {"file": self.map_file},
             "reference_path_m": self.path_length_m,
         }
 
