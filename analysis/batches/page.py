@@ -33,6 +33,7 @@ from analysis.batches.report import (
     pair_rows,
     robot_rows,
     run_command,
+    turn_rows,
     warning_lines,
 )
 from analysis.report.plain_values import write_json
@@ -282,7 +283,9 @@ def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
 
 def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
     return [
-        _figure(
+        _table(turn_rows(plan, results, key), f"Endings of the runs by `{key}`")
+        if drawn.in_turn is not None
+        else _figure(
             plot_panels(
                 plan, results, key.partition(",")[0].strip(), split_field(plan)
             ),
@@ -292,7 +295,8 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
         for k, (key, drawn) in enumerate(plan.draw.items())
         # Lists of boxes are not numbers, and no list is drawn twice. Therefore the runs
         # cannot be sorted by them. Bins of a single run would show no dependence.
-        if drawn.boxes is None and len(results) >= 2 * LEAST_BINS
+        if drawn.boxes is None
+        if drawn.in_turn is not None or len(results) >= 2 * LEAST_BINS
     ]
 
 
