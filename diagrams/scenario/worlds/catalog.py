@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ def open_worlds(source: str | Path) -> dict[str, Callable[[], World]]:
     if (folder / CYLINDERS).exists() or (folder / PATHS).exists():
         stamps = tuple(_stamp(folder / name) for name in (CYLINDERS, PATHS))
         worlds = _tables(folder, stamps)
-        return {name: lambda world=world: world for name, world in worlds.items()}
+        return {name: partial(worlds.__getitem__, name) for name in worlds}
     if folder.is_dir() and (found := gazebo_worlds(folder) or map_tests(folder)):
         return found
     what = "has no" if folder.is_dir() else "is no folder with"
