@@ -24,7 +24,7 @@ from diagrams.scenario.scenario import Name
 from diagrams.scenario.shorthand import ROBOT_FIELDS
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.meanings import meanings
-from systems.framework.parameters import Parameters
+from systems.framework.parameters import Parameters, Point
 from systems.laws.catalog import LAWS
 from systems.routes.parameters import RouteParameters
 from systems.sound.parameters import SoundParameters
@@ -72,7 +72,7 @@ class _Source(SourceRobotParameters):
 
     body: bool = True
     """Whether the source has a body that robots can hit and see; false: the source is
-    only a sound."""
+    only a point, and a sound."""
 
 
 class _File(_Robot, RunParameters):
@@ -85,6 +85,11 @@ class _File(_Robot, RunParameters):
     """Sources by name, each with the fields that differ from ``source`` and ``sound``;
     empty: one source, named ``source``. A source that no robot follows is an
     interferer."""
+    goal_m: Point | None = None
+    """Goal of the control point P: a point in W, m, in place of the source. It stands
+    for a source at rest without a body (``source.body: false``), ``hearing:
+    ideal_always``, and the follow distance 0. With a law that drives on a route, it is
+    ``route.goal_m``."""
     source: _Source = _Source()
     sound: SoundParameters = SoundParameters()
 

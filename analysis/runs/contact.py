@@ -15,6 +15,9 @@ from systems.world.geometry import (
     rectangle_clearance,
     rectangle_corners,
 )
+from systems.world.shapes import Shape
+
+Floats = NDArray[np.float64]
 
 
 def contact_point(result: RunResult) -> NDArray[np.float64]:
@@ -22,14 +25,37 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
 
     Raises InputError if the run had no collision.
     """
-    hit, scenario = result.collision, result.scenario
+    footprint, rows, nearest = _touching(result)
+    return touching_point(footprint, rows[nearest])
+
+
+def touched_shape(result: RunResult) -> Shape:
+    """Returns the part of a body that a robot touched, in the axes of the body.
+
+    It is one rectangle of a wall or a map, and the whole of any other body. Raises
+    InputError if the run had no collision.
+    """
+    *_, nearest = _touching(result)
+    assert result.collision is not None
+    shape = result.surroundings.bodies[result.collision.object].shape
+    if shape.polygon is not None:
+        return shape
+    return Shape(shape.rectangles[nearest : nearest + 1].copy())
+
+
+def _touching(result: RunResult) -> tuple[Floats, Floats, int]:
+    """Returns the robot's rectangle, those of the body, and the index of the nearest.
+
+    The rectangles are those at the time of the collision, in W.
+    """
+    hit = result.collision
     if hit is None:
         raise InputError("contact_point", f"the run ended by {result.cause!r}")
-    body = result.surroundings.bodies[hit.object].rectangles(hit.time)
+    rows = result.surroundings.bodies[hit.object].rectangles(hit.time)
     pose = result.poses("WB")[np.argmin(np.abs(result.time - hit.time))]
-    footprint = robot_rectangle(pose, scenario.only.robot)
-    nearest = min(body, key=lambda row: rectangle_clearance(footprint, row))
-    return touching_point(footprint, nearest)
+    footprint = robot_rectangle(pose, result.scenario.only.robot)
+    clearances = [rectangle_clearance(footprint, row) for row in rows]
+    return footprint, rows, int(np.argmin(clearances))
 
 
 def touching_point(

@@ -19,7 +19,7 @@ from matplotlib.colors import to_hex, to_rgb
 from numpy.typing import NDArray
 
 from analysis.report.palette import COLORS, ROBOT_COLORS
-from analysis.runs.contact import contact_point
+from analysis.runs.contact import contact_point, touched_shape
 from analysis.runs.known_space import has_known_space
 from analysis.views.bursts import call_time, sound_bursts
 from diagrams import RunResult, Scenario
@@ -346,7 +346,7 @@ def _collisions(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Laye
         things.append(
             Thing(
                 f"{carrier.path if carrier else 'collision/' + robot.path}/hit",
-                Touched(body.shape, BODY_HEIGHT_M),
+                Touched(touched_shape(own), BODY_HEIGHT_M),
                 color,
                 own.time,
                 place,

@@ -26,6 +26,7 @@ from diagrams.running.stop_rules import (
 from diagrams.scenario.bodies import Body, RecordedPath, robot_rectangle
 from diagrams.scenario.scenario import Scenario
 from systems.framework.block import Step
+from systems.world.plane import control_point
 
 #: The rules check for contacts at the ends of equal parts of a tick. ``BETWEEN_TICKS``:
 #: least number of parts. ``_PART_M``: greatest distance that a body may move in one
@@ -159,6 +160,7 @@ def _numbers_of(scenario: Scenario, name: str) -> RefereeNumbers:
     own, around = scenario.of_robot(name), scenario.surroundings(name)
     robots, bodies = [*scenario.robots], {**around.bodies}
     rests = not around.followed.path.moves
+    x, y = control_point(own.only.start.pose, own.only.robot.control_point_m)
     # A goal has no body. It comes after the bodies, and cannot be touched.
     if around.goal is not None:
         bodies[around.target] = around.followed
@@ -170,7 +172,7 @@ def _numbers_of(scenario: Scenario, name: str) -> RefereeNumbers:
         int(np.argmax(table.owners == target)),
         table,
         RuleNumbers(
-            own.stop,
+            own.stop.for_start(math.dist((x, y), around.followed.path.pose(0.0)[:2])),
             own.only.robot.control_point_m,
             own.only.follow_distance_m,
             own.goal_radius(moves=not rests),

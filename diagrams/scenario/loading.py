@@ -115,8 +115,8 @@ def written_fields(source: str | Path, *, law: Any = None) -> dict[str, Any]:
     """Reads the fields that the file of a scenario sets.
 
     Names of fields from the previous version are replaced by the present names. Paths
-    of sound files and of the map become absolute. If the file states no name of the scenario, the
-    function adds one.
+    of sound files and of the map become absolute. If the file states no name of the
+    scenario, the function adds one.
 
     Args:
         source: A name from the library, or the path of a file.

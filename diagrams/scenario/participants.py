@@ -413,4 +413,4 @@ class SourceParameters(SourceRobotParameters):
     """The sound of the source."""
     body: bool = True
     """Whether the source has a body that robots can hit and see; false: the source is
-    only a sound."""
+    only a point, and a sound."""

@@ -215,12 +215,11 @@ def _pixel_sums(path: Path, field: str) -> tuple[NDArray[Any], int]:
         # The size is checked here, more strictly than by Pillow.
         with warnings.catch_warnings(action="ignore"), Image.open(path) as image:
             _check_image(image, field)
-            if image.mode == "1":
-                image = image.convert("L")
-            elif image.mode not in ("L", "RGB", "RGBA"):
-                clear = image.mode in ("LA", "PA") or "transparency" in image.info
-                image = image.convert("RGBA" if clear else "RGB")
-            pixels = np.asarray(image, dtype=np.uint8)
+            clear = image.mode in ("LA", "PA") or "transparency" in image.info
+            mode = {"1": "L", "L": "L", "RGB": "RGB", "RGBA": "RGBA"}.get(
+                image.mode, "RGBA" if clear else "RGB"
+            )
+            pixels = np.asarray(image.convert(mode), dtype=np.uint8)
     except Image.DecompressionBombError:
         raise InputError(
             field, f"has more than {MOST_CELLS} cells; cut the map"
@@ -263,7 +262,8 @@ def _origin(content: Mapping[str, Any], field: str) -> tuple[float, float, float
 
 
 def _number(content: Mapping[str, Any], key: str, field: str) -> float:
-    if not _is_number(value := content.get(key)):
+    value: Any = content.get(key)
+    if not _is_number(value):
         raise _fault(field, key, value, "give a number")
     return float(value)
 

@@ -30,6 +30,9 @@ Engine = Literal["drake", "compiled"]
 #: Number of runs from which ``auto`` selects the compiled engine.
 MANY_RUNS = 100
 
+#: Value of ``stop.diverged_range_m`` for targets within this distance, m.
+_DIVERGED_RANGE_M = 20.0
+
 
 class StopParameters(Parameters):
     """Conditions that end a run, and limits within which a robot follows."""
@@ -49,11 +52,24 @@ class StopParameters(Parameters):
     (within 0.1 m) outside of its goal for this time."""
     lost_after_s: Duration = 20.0
     """Time without a valid target after which the run ends as lost, s."""
-    diverged_range_m: Length = 20.0
-    """Distance from the source or the goal beyond which the run ends as diverged, m."""
+    diverged_range_m: Length | None = None
+    """Distance from the source or the goal beyond which the run ends as diverged, m.
+    null: 20 m, or twice the distance at the start if the robot starts farther away than
+    20 m."""
     sound_within_m: Length = 0.6
     """Greatest distance of the source from the origin of B, m. If a search for a sound
     ends within this distance, the run counts as found."""
+
+    def for_start(self, distance_m: float) -> StopParameters:
+        """Returns a copy with a number for ``diverged_range_m``.
+
+        ``distance_m`` is the distance between P and the target at the start, m.
+        """
+        if self.diverged_range_m is not None:
+            return self
+        far = distance_m > _DIVERGED_RANGE_M
+        range_m = 2.0 * distance_m if far else _DIVERGED_RANGE_M
+        return self.model_copy(update={"diverged_range_m": range_m})
 
 
 class RunParameters(Parameters):

@@ -359,6 +359,8 @@ class Scenario(RunParameters):
         if isinstance(own, Router):
             goal = WaypointPath((own.route.goal_m,), speed=0.0)
             return Surroundings(bodies, GOAL, goal)
+        if target in self.sources and not self.sources[target].body:
+            return Surroundings(bodies, target, self.sources[target].path())
         bodies[target] = bodies.pop(target)
         return Surroundings(bodies, target)
 
@@ -386,9 +388,10 @@ class Scenario(RunParameters):
         return self.only.assumed_sound_speed_m_s or self.sound_speed_m_s
 
     @property
-    def source_size(self) -> tuple[float, float]:
-        """Length and width of ``source``, m."""
-        return self.source.length_m, self.source.width_m
+    def source_size(self) -> tuple[float, float] | None:
+        """Length and width of ``source``, m; None for a source without a body."""
+        source = self.source
+        return (source.length_m, source.width_m) if source.body else None
 
     @property
     def goal_radius_m(self) -> NonNegative:
@@ -424,7 +427,7 @@ class Scenario(RunParameters):
         check_searches(self.robots, self)
         faults = []
         for check in (
-            lambda: check_goals(self.robots, self.stop.diverged_range_m),
+            lambda: check_goals(self.robots, self.stop),
             lambda: check_filled_goals(self.robots, self.all_obstacles),
             self._check_rates,
             self._check_step,
@@ -477,11 +480,11 @@ class Scenario(RunParameters):
                     f"{target!r} is neither a source nor another robot with a "
                     f"loudspeaker; {remedy}",
                 )
-            if target in sources and not sources[target].body:
+            if robot.listens and target in sources and not sources[target].body:
                 raise InputError(
                     f"sources.{target}.body",
-                    f"is off, but robot {name!r} follows it; what is followed has a "
-                    "body: set it to true",
+                    f"is off, but robot {name!r} follows its sound; set it to true, or "
+                    "set hearing: ideal_always",
                 )
             if (
                 isinstance(robot, Follower)

@@ -18,6 +18,8 @@ from diagrams.scenario.participants import DEFAULT_LAW, KINDS, Robot, kind_of
 from systems.framework.input_error import InputError
 from systems.laws.catalog import LAWS
 
+#: Name of the field of a file that replaces the source by a point.
+GOAL_FIELD = "goal_m"
 #: Names of the only robot and of the only source.
 ROBOT, SOURCE = "robot", "source"
 
@@ -83,8 +85,9 @@ def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
         type stay unchanged, so that the validation reports them.
 
     Raises:
-        InputError: ``source`` has a sound.
+        InputError: ``source`` has a sound, or ``goal_m`` is given with ``sources``.
     """
+    data = _with_goal(data)
     run = {key: value for key, value in data.items() if key not in ROBOT_FIELDS}
     shared = {key: value for key, value in data.items() if key in ROBOT_FIELDS}
     source, sound = _plain(run.pop("source", {})), _plain(run.pop("sound", {}))
@@ -112,6 +115,30 @@ def resolved(data: Mapping[str, Any]) -> dict[str, Any]:
             for name, own in sources.items()
         }
     return run
+
+
+def _with_goal(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Replaces the field ``goal_m`` by the fields that it stands for."""
+    if data.get(GOAL_FIELD) is None:
+        return {key: value for key, value in data.items() if key != GOAL_FIELD}
+    if data.get("sources"):
+        raise InputError(
+            GOAL_FIELD,
+            "cannot hold together with sources; remove one of them, or set body: false "
+            "for the source that is the goal",
+        )
+    found = dict(data)
+    goal, law = found.pop(GOAL_FIELD), str(data.get("law", DEFAULT_LAW))
+    if law in LAWS and LAWS[law].robot == "router":
+        return joined(found, {"route": {"goal_m": goal}})
+    return joined(
+        found,
+        {
+            "hearing": "ideal_always",
+            "attraction": {"follow_distance_m": 0.0},
+            "source": {"waypoints_m": [goal], "body": False},
+        },
+    )
 
 
 def _group(value: Any) -> dict[str, Any]:
@@ -184,6 +211,8 @@ def as_written(place: Sequence[str], data: Mapping[str, Any]) -> list[str]:
     short = rest
     if group == "sources" and rest[:1] != ["sound"]:
         short = ["source", *rest]
+        if rest[:1] == ["waypoints_m"] and data.get(GOAL_FIELD) is not None:
+            return [GOAL_FIELD]
     own = _group(data.get(group)).get(name)
     if not data.get(group) or (not _has(own, rest) and _has(data, short)):
         return short

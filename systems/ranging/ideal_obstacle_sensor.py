@@ -88,7 +88,7 @@ class ObstacleNumbers(NamedTuple):
     slots: int
     """Largest number of vectors."""
     source_size: tuple[float, float]
-    """Length and width of the leader, m."""
+    """Length and width of the leader, m; negative for a leader without a body."""
     owners: NDArray[np.int64]
     """(n + 1,) number of the body of each rectangle. The leader is the last body."""
 
@@ -105,6 +105,8 @@ def ideal_obstacle_step(
         size = sizes[3 * k], sizes[3 * k + 1], float_of(sizes[3 * k + 2])
         # The leader stays the last body.
         bodies.insert(k, (x, y, theta, size[0], size[1], size[2]))
+    if length < 0.0:
+        bodies.pop()
     vectors = nearest_vectors(
         pose_WB,
         bodies,
@@ -131,7 +133,8 @@ def IdealObstacleSensor_(T):
             maximum_range_m: Largest distance from P at which bodies are seen, m.
             all_bodies: Whether to report up to three bodies (``aggregation: sum``)
                 instead of only the nearest body.
-            source_size: Length and width of the leader, m.
+            source_size: Length and width of the leader, m. None: the leader has no
+                body.
             obstacle_count: Number of rectangles on the ports ``poses_WO`` and
                 ``sizes``.
             owners: Number of the obstacle of each rectangle, ascending from 0. None:
@@ -153,20 +156,20 @@ def IdealObstacleSensor_(T):
             robot: RobotParameters = RobotParameters(),
             maximum_range_m: Positive = 3.0,
             all_bodies: bool = False,
-            source_size: Size = (0.326, 0.352),
+            source_size: Size | None = (0.326, 0.352),
             obstacle_count: int = 0,
             owners: Sequence[int] | None = None,
             converter: Any = None,
         ) -> None:
             super().__init__(converter=converter)
             check_finite("IdealObstacleSensor: maximum_range_m", maximum_range_m)
-            check_finite("IdealObstacleSensor: source_size", source_size)
+            check_finite("IdealObstacleSensor: source_size", source_size or ())
             self.set_name("ideal_obstacle_sensor")
             numbers = ObstacleNumbers(
                 robot.control_point_m,
                 maximum_range_m,
                 SLOTS if all_bodies else 1,
-                source_size,
+                source_size or (-1.0, -1.0),
                 with_last(owners_of(obstacle_count, owners)),
             )
             self.declare(

@@ -23,6 +23,7 @@ PAGES = (
     "stability_report.md",
     "your_recording.md",
     "your_diagram.md",
+    "maps.md",
 )
 #: What only works in a clone, and was done before.
 IN_A_CLONE = ("make ", ". .venv", "git ", "pip ", "cd ")

@@ -8,19 +8,19 @@ from itertools import combinations
 
 from diagrams.scenario.bodies import Body
 from diagrams.scenario.participants import Robot, Router
+from diagrams.scenario.run_parameters import StopParameters
 from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
 from systems.world.parameters import ObstacleParameters
 from systems.world.plane import control_point
 
 
-def check_goals(robots: Mapping[str, Robot], farthest_m: float) -> None:
+def check_goals(robots: Mapping[str, Robot], stop: StopParameters) -> None:
     """Raises an error if a robot with a route cannot reach its goal.
 
     Args:
         robots: Robots of the scenario, by name.
-        farthest_m: ``stop.diverged_range_m``, the distance from the goal beyond which a
-            run counts as diverged, m.
+        stop: Conditions that end a run.
 
     Raises:
         InputError: A robot starts so far from its goal that the run counts as diverged.
@@ -32,12 +32,13 @@ def check_goals(robots: Mapping[str, Robot], farthest_m: float) -> None:
     for name, robot in routed.items():
         goal = robot.route.goal_m
         away = math.dist(goal, _start(robot))
-        if away > farthest_m:
+        farthest_m = stop.diverged_range_m
+        if farthest_m is not None and away > farthest_m:
             raise InputError(
                 f"robots.{name}.route.goal_m",
                 f"({goal[0]:g}, {goal[1]:g}) is {away:.3g} m from the start: "
                 f"beyond stop.diverged_range_m, {farthest_m:g} m, a run counts "
-                "as diverged; raise that range, or move the goal",
+                "as diverged; set that range to null, or move the goal",
             )
     for (_, first), (name, second) in combinations(routed.items(), 2):
         apart = math.dist(first.route.goal_m, second.route.goal_m)

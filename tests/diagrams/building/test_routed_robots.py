@@ -151,7 +151,7 @@ def test_the_same_seed_gives_the_same_bytes():
         ),
         (["route.clearance_m=0.1"], "^route.clearance_m"),
         (
-            ["route.goal_m=[60, 0]"],
+            ["route.goal_m=[60, 0]", "stop.diverged_range_m=20"],
             "^route.goal_m: .* beyond stop.diverged_range_m, 20",
         ),
         (["guard={}"], "^guard: is not a field of robots that drive .* guarded, "),

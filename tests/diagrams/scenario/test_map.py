@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from diagrams import load_scenario, simulate, write_scenario
 from systems.framework.input_error import InputError
+from systems.routes.route import plan_route
 
 #: A wall from x = 2 to 2.2 m, made of two rectangles: 4 m long with a notch.
 WALL = {"origin": "[-1.0, -3.0, 0.0]", "resolution": 0.1}
@@ -115,3 +118,13 @@ def test_a_goal_inside_a_wall_is_refused(tmp_path, scenario_file):
 def test_faults_of_the_map_name_its_field(scenario_file, fields, message):
     with pytest.raises(InputError, match=message):
         load_scenario(scenario_file, fields)
+
+
+def test_a_route_leads_around_the_wall_of_a_map(scenario_file):
+    """Half of it: a tangent to the disc around the corner (2, 2), an arc, and 0.1 m."""
+    radius, known = 0.3, load_scenario(scenario_file).mapped()
+    away = math.hypot(1.9, 2.0)
+    heading = math.atan2(2.0, 1.9) + math.asin(radius / away)
+    half = math.sqrt(away**2 - radius**2) + radius * heading + 0.1
+    route = plan_route((0.1, 0.0), (4.1, 0.0), known, clearance_m=radius)
+    assert route.length_m == pytest.approx(2.0 * half, rel=0.02)

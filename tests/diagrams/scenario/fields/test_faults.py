@@ -87,7 +87,7 @@ def test_a_field_near_by_is_meant_before_a_far_namesake(
         ("robot.max_speed=1", "did you mean 'robot.top_speed_m_s'?"),
         ("attraction.K_r=3", "did you mean 'attraction.stiffness_n_m'?"),
         ("room.width_m=5", "is not a field of a scenario; room has size_m, "),
-        ("guard.margin=1", "wheel_error, place_error_m; use one of them, or remove it"),
+        ("guard.margin=1", "place_error_m, start_bubble_m; use one of them, or remove"),
         ("doppler=1", "is not a field of a scenario; remove it"),
         ("source.waypoints_m=[2.0, 0.0]", "give a list of lists, [[2.0, 0.0]]"),
         (
