@@ -169,7 +169,7 @@ def _about(batch: Batch, document: dict[str, Any]) -> list[Content]:
 
 def _plan_rows(plan: SweepPlan, rows: pd.DataFrame) -> list[tuple[str, str]]:
     causes = rows["cause"].value_counts()
-    draws = {key: d.model_dump(exclude_none=True) for key, d in plan.draw.items()}
+    draws = {key: _few(d.model_dump(exclude_none=True)) for key, d in plan.draw.items()}
     return [
         ("Ended", ", ".join(f"{count} {cause}" for cause, count in causes.items())),
         ("Set", _listed(plan.set)),
@@ -177,6 +177,14 @@ def _plan_rows(plan: SweepPlan, rows: pd.DataFrame) -> list[tuple[str, str]]:
         ("Draw", _listed(draws)),
         ("Drawn again", f"{int((rows['redraws'] > 0).sum())} runs"),
     ]
+
+
+def _few(draw: dict[str, Any]) -> dict[str, Any]:
+    """Shortens a long list of values that occur in turn."""
+    values = draw.get("in_turn", ())
+    if len(values) < 6:
+        return draw
+    return draw | {"in_turn": [values[0], f"{len(values) - 2} more", values[-1]]}
 
 
 def _warnings(summary: Summary) -> list[Content]:

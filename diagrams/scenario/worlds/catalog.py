@@ -172,8 +172,7 @@ def filled(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _fields(data: Mapping[str, Any], text: Any, folder: Path) -> dict[str, Any]:
-    routed = data.get("route") is not None
-    return find_world(text, folder).fields(routed=routed)
+    return find_world(text, folder).fields(data)
 
 
 def _stamp(path: Path) -> tuple[int, int]:

@@ -28,20 +28,22 @@ class World:
     map_file: str | None = None
     """Full path of a map with further obstacles, see ``map.file`` of a scenario."""
 
-    def fields(self, *, routed: bool) -> dict[str, Any]:
+    def fields(self, data: Mapping[str, Any]) -> dict[str, Any]:
         """Returns the fields of a scenario that the world determines.
 
         Args:
-            routed: Whether the robots drive on planned routes. Otherwise, they follow
-                a source, which is at the goal.
+            data: Other fields of the scenario. If it has a route or a source, the goal
+                of the world is the goal of the route, or the place of the source.
 
         Returns:
             Plain values by name of the field.
         """
         goal = [*self.goal_m]
-        target: dict[str, Any] = {"source": {"waypoints_m": [goal]}}
-        if routed:
+        target: dict[str, Any] = {"goal_m": goal}
+        if data.get("goal_m") is None and data.get("route") is not None:
             target = {"route": {"goal_m": goal}}
+        elif data.get("goal_m") is None and data.get("source") is not None:
+            target = {"source": {"waypoints_m": [goal]}}
         return {
             "obstacles": [dict(each) for each in self.obstacles],
             "start": {

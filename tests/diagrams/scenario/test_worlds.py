@@ -97,7 +97,7 @@ def test_tables_become_obstacles_start_goal_and_path(tmp_path):
     start = scenario.only.start
     assert (start.position_m, start.heading_deg) == ((-1.0, 3.0), 45.0)
     assert scenario.source.waypoints_m == ((-2.25, 9.0),)
-    assert scenario.source.length_m == 0.02
+    assert scenario.source.body is False, "a point"
     assert scenario.reference_path_m == 12.5
 
 
@@ -128,6 +128,13 @@ def test_a_robot_on_a_route_gets_the_goal_of_its_route(tmp_path):
     tables(tmp_path)
     routed = load_scenario("unknown_block", {"world": f"{tmp_path}:b"})
     assert routed.router.route.goal_m == (-2.25, 13.0)
+
+
+def test_a_source_moves_to_the_goal_and_keeps_its_body(tmp_path):
+    fields = {"world": f"{tables(tmp_path)}:b", "source": {"length_m": 0.5}}
+    source = load_scenario({"hearing": "ideal", **fields}).source
+    assert (source.waypoints_m, source.length_m) == (((-2.25, 13.0),), 0.5)
+    assert source.body
 
 
 def test_gazebo_poses_are_nested_and_planes_are_no_obstacles(tmp_path):
