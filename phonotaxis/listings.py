@@ -85,6 +85,7 @@ class Worlds(Listing):
                     "start_heading_deg": each.heading_deg,
                     "goal_m": [*each.goal_m],
                     "path_length_m": each.path_length_m,
+                    "map": each.map_file,
                 }
                 for name, each in self._found.items()
             ],
@@ -103,10 +104,9 @@ class Worlds(Listing):
 def _about(world: World) -> str:
     (x, y), (goal_x, goal_y) = world.start_m, world.goal_m
     length = world.path_length_m
-    return (
-        f"{len(world.obstacles)} obstacles, from ({x:g}, {y:g}) to "
-        f"({goal_x:g}, {goal_y:g}) m, "
-        + ("no path length" if length is None else f"path {length:.2f} m")
+    what = f"{len(world.obstacles)} obstacles" if world.map_file is None else "map"
+    return f"{what}, from ({x:g}, {y:g}) to ({goal_x:g}, {goal_y:g}) m, " + (
+        "no path length" if length is None else f"path {length:.2f} m"
     )
 
 

@@ -7,7 +7,6 @@ reference path is the shortest one for this disc on the grid.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from diagrams.scenario.worlds.cylinder_tables import CYLINDERS, PATHS
 from diagrams.scenario.worlds.world import GOAL_M, RADIUS_M, START_M
 
 FOLDER = Path(diagrams.__file__).parent / "worlds"
-SEED, WORLDS = 2026, 12
+SEED = 2026
 #: Side of a cell, m. Cylinders in neighboring cells touch each other.
 CELL_M = 2.0 * RADIUS_M
 #: Cells across and along the corridor, and the first row of the random field. The field
@@ -31,12 +30,15 @@ COLUMNS, ROWS, FIRST_ROW = 30, 64, 34
 ORIGIN_M = (-4.425, 0.075)
 #: Shares of cells that are occupied before the automaton runs, and numbers of its
 #: steps. Each world has one pair of them.
-FILLED, STEPS = (0.15, 0.2, 0.25, 0.3), (2, 3, 4)
+FILLED, STEPS = (0.14, 0.18, 0.22, 0.25), (2, 3, 4)
+WORLDS = len(FILLED) * len(STEPS)
 #: An empty cell with at least this number of occupied neighbors becomes occupied. An
 #: occupied cell with at most this number of them becomes empty.
 _FILL_FROM, _CLEAR_TO = 5, 1
 #: Radius of the disc that can pass, m. The narrowest passages are twice as wide.
 DISC_M = 0.375
+#: Greatest number of draws of a world.
+_ATTEMPTS = 10_000
 _AROUND = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]])
 
 Cells = NDArray[np.bool_]
@@ -99,35 +101,40 @@ def _nearest_cell(point: Sequence[float]) -> tuple[tuple[int, int], float]:
     return (row, column), float(np.hypot(y - row, x - column)) * CELL_M
 
 
-def make_worlds() -> tuple[list[list[str]], list[list[str]]]:
-    """Returns the rows of both tables, without their headings."""
-    generator = np.random.Generator(np.random.Philox(seed=SEED))
-    cylinders: list[list[str]] = []
-    paths: list[list[str]] = []
-    while len(paths) < WORLDS:
-        name = len(paths)
-        filled = FILLED[name // len(STEPS) % len(FILLED)]
-        cells = draw_cells(generator, filled, STEPS[name % len(STEPS)])
-        length = reference_length(cells)
-        if length is None:
-            continue
-        for row, column in np.argwhere(cells):
-            x, y = ORIGIN_M[0] + column * CELL_M, ORIGIN_M[1] + row * CELL_M
-            cylinders.append([str(name), f"{x:.3f}", f"{y:.3f}"])
-        paths.append([str(name), f"{length:.4f}"])
-    return cylinders, paths
+def make_world(number: int) -> tuple[Cells, float]:
+    """Returns the occupied cells of a world, and the length of its path, m.
+
+    The generator draws until the disc can pass. The result depends only on the number.
+    """
+    generator = np.random.Generator(np.random.Philox(seed=[SEED, number]))
+    filled, steps = FILLED[number // len(STEPS)], STEPS[number % len(STEPS)]
+    for _ in range(_ATTEMPTS):
+        cells = draw_cells(generator, filled, steps)
+        if (length := reference_length(cells)) is not None:
+            return cells, length
+    raise RuntimeError(f"world {number}: the disc passes in none of {_ATTEMPTS} draws")
+
+
+def rows_of(number: int) -> tuple[list[str], list[str]]:
+    """Returns the lines of a world in ``cylinders.csv`` and in ``paths.csv``."""
+    cells, length = make_world(number)
+    places = np.argwhere(cells)[:, ::-1] * CELL_M + ORIGIN_M
+    return (
+        [f"{number},{x:.3f},{y:.3f}" for x, y in places.tolist()],
+        [f"{number},{length:.4f}"],
+    )
 
 
 def main() -> None:
     """Writes both tables into the package."""
-    cylinders, paths = make_worlds()
+    made = [rows_of(number) for number in range(WORLDS)]
     FOLDER.mkdir(exist_ok=True)
-    for name, head, rows in (
-        (CYLINDERS, ["world", "x_m", "y_m"], cylinders),
-        (PATHS, ["world", "path_length_m"], paths),
+    for k, name, head in (
+        (0, CYLINDERS, "world,x_m,y_m"),
+        (1, PATHS, "world,path_length_m"),
     ):
-        with (FOLDER / name).open("w", encoding="utf-8", newline="") as file:
-            csv.writer(file, lineterminator="\n").writerows([head, *rows])
+        lines = [head, *(line for each in made for line in each[k])]
+        (FOLDER / name).write_text("\n".join([*lines, ""]), "utf-8")
 
 
 if __name__ == "__main__":

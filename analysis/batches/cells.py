@@ -304,7 +304,7 @@ def marginal(
         return Marginal(
             path,
             np.arange(len(names), dtype=float),
-            tuple(_label(path, name) for name in names),
+            tuple(value_label(path, name) for name in names),
             tuple(quantity.estimate(runs[values == name]) for name in names),
         )
     count = int(np.clip(len(runs) // USUAL_RUNS, LEAST_BINS, MOST_BINS))
@@ -329,7 +329,7 @@ def cell_label(fields: dict[str, Any]) -> str:
     return ", ".join(pairs) or "all runs"
 
 
-def _label(path: str, value: Any) -> str:
+def value_label(path: str, value: Any) -> str:
     """Returns a short text for a value; the name of a world without its set."""
     return short(value.rpartition(":")[2] if path == "world" else value)
 

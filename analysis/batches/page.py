@@ -33,6 +33,7 @@ from analysis.batches.report import (
     pair_rows,
     robot_rows,
     run_command,
+    turn_rows,
     warning_lines,
 )
 from analysis.report.plain_values import write_json
@@ -168,7 +169,7 @@ def _about(batch: Batch, document: dict[str, Any]) -> list[Content]:
 
 def _plan_rows(plan: SweepPlan, rows: pd.DataFrame) -> list[tuple[str, str]]:
     causes = rows["cause"].value_counts()
-    draws = {key: d.model_dump(exclude_none=True) for key, d in plan.draw.items()}
+    draws = {key: _few(d.model_dump(exclude_none=True)) for key, d in plan.draw.items()}
     return [
         ("Ended", ", ".join(f"{count} {cause}" for cause, count in causes.items())),
         ("Set", _listed(plan.set)),
@@ -176,6 +177,14 @@ def _plan_rows(plan: SweepPlan, rows: pd.DataFrame) -> list[tuple[str, str]]:
         ("Draw", _listed(draws)),
         ("Drawn again", f"{int((rows['redraws'] > 0).sum())} runs"),
     ]
+
+
+def _few(draw: dict[str, Any]) -> dict[str, Any]:
+    """Shortens a long list of values that occur in turn."""
+    values = draw.get("in_turn", ())
+    if len(values) < 6:
+        return draw
+    return draw | {"in_turn": [values[0], f"{len(values) - 2} more", values[-1]]}
 
 
 def _warnings(summary: Summary) -> list[Content]:
@@ -282,7 +291,9 @@ def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
 
 def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
     return [
-        _figure(
+        _table(turn_rows(plan, results, key), f"Endings of the runs by `{key}`")
+        if drawn.in_turn is not None
+        else _figure(
             plot_panels(
                 plan, results, key.partition(",")[0].strip(), split_field(plan)
             ),
@@ -292,7 +303,8 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[Content]:
         for k, (key, drawn) in enumerate(plan.draw.items())
         # Lists of boxes are not numbers, and no list is drawn twice. Therefore the runs
         # cannot be sorted by them. Bins of a single run would show no dependence.
-        if drawn.boxes is None and len(results) >= 2 * LEAST_BINS
+        if drawn.boxes is None
+        if drawn.in_turn is not None or len(results) >= 2 * LEAST_BINS
     ]
 
 

@@ -9,10 +9,19 @@ from typing import Any
 import pandas as pd
 
 from analysis.batches.batch import Batch, Summary, compares_laws
-from analysis.batches.cells import Cell, Quantity, quantities, text_table
+from analysis.batches.cells import (
+    Cell,
+    Quantity,
+    by_cell,
+    cell_label,
+    quantities,
+    text_table,
+    value_label,
+)
 from analysis.batches.examples import example_files, example_key
 from analysis.batches.one_run import FAILED
 from analysis.batches.pairs import Pair, PairedMedian, PairedRate
+from analysis.batches.plan import SweepPlan
 from analysis.batches.run_rows import warning_counts
 from analysis.batches.sweep import reproducing_command
 from analysis.report.plain_values import plain
@@ -136,6 +145,21 @@ def robot_rows(summary: Summary) -> list[list[str]]:
         for robot in summary.robots:
             figures = (_text_of(cell, Quantity(f"{robot}.{x}")) for x in metrics)
             rows.append([cell.label, robot, *figures])
+    return rows
+
+
+def turn_rows(plan: SweepPlan, runs: pd.DataFrame, key: str) -> list[list[str]]:
+    """Returns the rows of a table: a heading, then the endings with each listed value.
+
+    The argument ``key`` is a key of ``plan.draw`` whose values occur in turn.
+    """
+    path = key.partition(",")[0].strip()
+    cells = by_cell(plan, runs)
+    rows = [[path, *map(cell_label, plan.cells())]]
+    for value in dict.fromkeys(runs[path]):
+        own = (cell[cell[path] == value]["cause"] for cell in cells)
+        counts = (counts_text(causes.value_counts().to_dict()) for causes in own)
+        rows.append([value_label(path, value), *counts])
     return rows
 
 

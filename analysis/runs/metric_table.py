@@ -497,7 +497,7 @@ _WORLD = (
         lambda run: _score(run, 2.0),
         average="mean",
         paired=True,
-        shown="table",
+        shown="picture",
     ),
     Metric(
         "score_4",

@@ -45,8 +45,8 @@ SENSOR_PRESETS: Mapping[str, Mapping[str, Any]] = {
     # number of beams and the range are our choice.
     "lidar_270": {
         **_MAST,
-        "sensors": [{"axis_deg": 133.75 - 2.5 * k} for k in range(108)],
-        "beam_half_angle_deg": 1.25,
+        "sensors": [{"axis_deg": 3.6 * k} for k in range(37, -38, -1)],
+        "beam_half_angle_deg": 1.8,
         "maximum_range_m": 10.0,
         "noise_m": 0.01,
     },

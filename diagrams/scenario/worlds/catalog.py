@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from diagrams.scenario.shorthand import joined
 from diagrams.scenario.suggestions import did_you_mean
 from diagrams.scenario.worlds.cylinder_tables import CYLINDERS, PATHS, read_tables
 from diagrams.scenario.worlds.gazebo_worlds import gazebo_worlds, path_file
+from diagrams.scenario.worlds.map_tests import MAP, TESTS, map_tests
 from diagrams.scenario.worlds.world import World
 from systems.framework.input_error import InputError
 
@@ -23,8 +24,8 @@ def open_worlds(source: str | Path) -> dict[str, Callable[[], World]]:
     """Lists the worlds of a set, without reading all of them.
 
     Args:
-        source: ``shipped``, or a folder with ``cylinders.csv`` and ``paths.csv``, or
-            with ``world_N.world``.
+        source: ``shipped``, or a folder with ``cylinders.csv`` and ``paths.csv``, with
+            ``world_N.world``, or with folders of maps.
 
     Returns:
         A function that reads each world, by name of the world, in order.
@@ -36,14 +37,14 @@ def open_worlds(source: str | Path) -> dict[str, Callable[[], World]]:
     if (folder / CYLINDERS).exists() or (folder / PATHS).exists():
         stamps = tuple(_stamp(folder / name) for name in (CYLINDERS, PATHS))
         worlds = _tables(folder, stamps)
-        return {name: lambda world=world: world for name, world in worlds.items()}
-    if folder.is_dir() and (found := gazebo_worlds(folder)):
+        return {name: partial(worlds.__getitem__, name) for name in worlds}
+    if folder.is_dir() and (found := gazebo_worlds(folder) or map_tests(folder)):
         return found
     what = "has no" if folder.is_dir() else "is no folder with"
     raise InputError(
         "worlds",
-        f"{source} {what} {CYLINDERS} or world_0.world; give the folder that has them, "
-        f"or {SHIPPED!r}",
+        f"{source} {what} {CYLINDERS}, world_0.world, or maps with "
+        f"{TESTS}; give the folder that has them, or {SHIPPED!r}",
     )
 
 
@@ -55,7 +56,9 @@ def world_files(text: Any, folder: Path) -> list[Path]:
         return [root / CYLINDERS, root / PATHS]
     files = [root / f"world_{name}.{ending}" for ending in ("world", "sdf")]
     paths = [path_file(file) for file in files]
-    return [*files, *(path for path in paths if path)]
+    maps = [root, root / name.rpartition("_")[0]]
+    tests = [place / file for place in maps for file in (MAP, TESTS)]
+    return [*files, *(path for path in paths if path), *tests]
 
 
 def find_world(text: Any, folder: Path) -> World:
@@ -169,8 +172,7 @@ def filled(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _fields(data: Mapping[str, Any], text: Any, folder: Path) -> dict[str, Any]:
-    routed = data.get("route") is not None
-    return find_world(text, folder).fields(routed=routed)
+    return find_world(text, folder).fields(data)
 
 
 def _stamp(path: Path) -> tuple[int, int]:

@@ -25,21 +25,25 @@ class World:
     goal_m: tuple[float, float] = GOAL_M
     path_length_m: float | None = None
     """Length of the reference path from start to goal. None: not known."""
+    map_file: str | None = None
+    """Full path of a map with further obstacles, see ``map.file`` of a scenario."""
 
-    def fields(self, *, routed: bool) -> dict[str, Any]:
+    def fields(self, data: Mapping[str, Any]) -> dict[str, Any]:
         """Returns the fields of a scenario that the world determines.
 
         Args:
-            routed: Whether the robots drive on planned routes. Otherwise, they follow
-                a source, which is at the goal.
+            data: Other fields of the scenario. If it has a route or a source, the goal
+                of the world is the goal of the route, or the place of the source.
 
         Returns:
             Plain values by name of the field.
         """
         goal = [*self.goal_m]
-        target: dict[str, Any] = {"source": {"waypoints_m": [goal]}}
-        if routed:
+        target: dict[str, Any] = {"goal_m": goal}
+        if data.get("goal_m") is None and data.get("route") is not None:
             target = {"route": {"goal_m": goal}}
+        elif data.get("goal_m") is None and data.get("source") is not None:
+            target = {"source": {"waypoints_m": [goal]}}
         return {
             "obstacles": [dict(each) for each in self.obstacles],
             "start": {
@@ -47,6 +51,7 @@ class World:
                 "heading_deg": self.heading_deg,
             },
             **target,
+            "map": None if self.map_file is None else {"file": self.map_file},
             "reference_path_m": self.path_length_m,
         }
 

@@ -44,10 +44,12 @@ def gazebo(folder: Path, *models: str, number: int = 7) -> Path:
 
 
 def test_our_worlds_are_those_that_the_program_makes():
-    cylinders, paths = made.make_worlds()
-    for name, rows in (("cylinders.csv", cylinders), ("paths.csv", paths)):
-        shipped = (made.FOLDER / name).read_text("utf-8").splitlines()[1:]
-        assert shipped == [",".join(row) for row in rows]
+    for number in (0, 4):
+        rows = made.rows_of(number)
+        for name, lines in zip(("cylinders.csv", "paths.csv"), rows, strict=True):
+            shipped = (made.FOLDER / name).read_text("utf-8").splitlines()
+            own = [line for line in shipped if line.startswith(f"{number},")]
+            assert own == lines
 
 
 def test_a_disc_passes_through_each_of_our_worlds():
@@ -95,7 +97,7 @@ def test_tables_become_obstacles_start_goal_and_path(tmp_path):
     start = scenario.only.start
     assert (start.position_m, start.heading_deg) == ((-1.0, 3.0), 45.0)
     assert scenario.source.waypoints_m == ((-2.25, 9.0),)
-    assert scenario.source.length_m == 0.02
+    assert scenario.source.body is False, "a point"
     assert scenario.reference_path_m == 12.5
 
 
@@ -126,6 +128,13 @@ def test_a_robot_on_a_route_gets_the_goal_of_its_route(tmp_path):
     tables(tmp_path)
     routed = load_scenario("unknown_block", {"world": f"{tmp_path}:b"})
     assert routed.router.route.goal_m == (-2.25, 13.0)
+
+
+def test_a_source_moves_to_the_goal_and_keeps_its_body(tmp_path):
+    fields = {"world": f"{tables(tmp_path)}:b", "source": {"length_m": 0.5}}
+    source = load_scenario({"hearing": "ideal", **fields}).source
+    assert (source.waypoints_m, source.length_m) == (((-2.25, 13.0),), 0.5)
+    assert source.body
 
 
 def test_gazebo_poses_are_nested_and_planes_are_no_obstacles(tmp_path):
@@ -207,6 +216,58 @@ def test_a_faulty_path_is_refused(tmp_path):
     (tmp_path / "path_7.npy").write_text("no array", "utf-8")
     with pytest.raises(InputError, match="cannot be read"):
         open_worlds(tmp_path)["7"]()
+
+
+CONFIG = """# Test 1
+<arg name="initial_pose_x" default="0.5"/>
+<arg name="initial_pose_y" default="-0.5"/>
+<arg name="initial_pose_a" default="-3.142"/>
+<arg name="goal_pose_x" default="-0.5"/>
+<arg name="goal_pose_y" default="0.25"/>
+<arg name="goal_pose_a" default="0"/>
+"""
+
+
+def a_map(folder: Path, config: str = CONFIG) -> Path:
+    """A map of 40 x 40 cells of 10 cm around the origin, with one occupied cell."""
+    place = folder / "maze"
+    place.mkdir()
+    pixels = np.full((40, 40), 254, dtype=np.uint8)
+    pixels[0, 0] = 0  # the upper left corner
+    (place / "map.pgm").write_bytes(b"P5 40 40 255\n" + pixels.tobytes())
+    header = "image: map.pgm\nresolution: 0.1\norigin: [-2, -2, 0]\nnegate: 0\n"
+    header += "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    (place / "map.yaml").write_text(header, "utf-8")
+    (place / "config.txt").write_text(config, "utf-8")
+    return folder
+
+
+def test_tests_of_a_map_are_worlds(tmp_path):
+    a_map(tmp_path)
+    for source in (tmp_path, tmp_path / "maze"):
+        assert chosen_worlds(source) == [f"{source}:maze_1"]
+    scenario = load_scenario("barn", {"world": f"{tmp_path}:maze_1"})
+    assert scenario.map.file == str(tmp_path / "maze" / "map.yaml")
+    assert scenario.only.start.position_m == (0.5, -0.5)
+    heading = scenario.only.start.heading_deg
+    assert math.cos(math.radians(heading)) == pytest.approx(-1.0, abs=1e-6)
+    assert scenario.source.waypoints_m == ((-0.5, 0.25),)
+    assert (scenario.obstacles, scenario.reference_path_m) == ((), None)
+    assert scenario.with_({"world": "0"}).map is None
+
+
+@pytest.mark.parametrize(
+    ("config", "hint"),
+    [
+        ("", "has no tests"),
+        (CONFIG.replace("# Test 1", ""), "line 2 precedes all tests"),
+        (CONFIG.replace("0.25", "far"), "goal_pose_y is 'far'"),
+        (CONFIG.replace("goal_pose_x", "goal_x"), "test 1 has no goal_pose_x"),
+    ],
+)
+def test_a_faulty_test_of_a_map_is_refused(tmp_path, config, hint):
+    with pytest.raises(InputError, match=hint):
+        open_worlds(a_map(tmp_path, config))
 
 
 def test_worlds_are_chosen_by_number_or_by_name(tmp_path):

@@ -115,9 +115,11 @@ def test_a_given_position_wins_over_the_mast():
 
 def test_a_scanner_sees_270_deg_ahead_without_gaps():
     scan = sensors("lidar_270")
-    np.testing.assert_allclose(np.diff(scan.axes_deg), -2.0 * 1.25)
-    assert scan.axes_deg[0] + 1.25 == -(scan.axes_deg[-1] - 1.25) == 135.0
-    assert (scan.count, scan.maximum_range_m, scan.noise_m) == (108, 10.0, 0.01)
+    np.testing.assert_allclose(np.diff(scan.axes_deg), -2.0 * 1.8)
+    assert scan.axes_deg[0] + 1.8 == pytest.approx(135.0)
+    assert scan.axes_deg[0] == -scan.axes_deg[-1]
+    assert 0.0 in scan.axes_deg, "the guard needs a view straight ahead"
+    assert (scan.count, scan.maximum_range_m, scan.noise_m) == (75, 10.0, 0.01)
 
 
 def test_a_lidar_is_farther_and_noisier():
