@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from analysis.report.palette import COLORS, draw_grid
 from docs.building.result_blocks import RESULTS
@@ -30,8 +31,10 @@ def plot_law_rates() -> Figure:
     cells = json.loads(SUMMARY.read_text("utf-8"))["cells"]
     scenarios = list(dict.fromkeys(cell["scenario"] for cell in cells))
     columns = _RATES | _METRICS
-    figure = Figure(figsize=(11.0, 1.0 + 1.4 * len(scenarios)), layout="constrained")
-    figure.get_layout_engine().set(wspace=0.04)
+    figure = Figure(
+        figsize=(11.0, 1.0 + 1.4 * len(scenarios)),
+        layout=ConstrainedLayoutEngine(wspace=0.04),
+    )
     grid = figure.subplots(
         len(scenarios), len(columns), squeeze=False, sharex="col", sharey=True
     )

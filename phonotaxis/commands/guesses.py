@@ -189,7 +189,7 @@ def no_option(
     own = options[command]
     found = re.match(r"--?([A-Za-z][\w-]*)(?:=(.*))?$", unknown[0])
     if found is None:
-        return f"{text}{_no_word(command, unknown[0], own)}"
+        return f"{text}{_no_word(unknown[0], own)}"
     name, value = found[1], found[2] or _next_word(words, unknown[0])
     if name in _POSITIONAL and "set" in own:
         return f"{text}; write phonotaxis {command} {value or 'SCENARIO'}"
@@ -207,12 +207,10 @@ def _next_word(words: Sequence[str], word: str) -> str:
     return "" if after[0].startswith("-") and not after[0][1:2].isdigit() else after[0]
 
 
-def _no_word(command: str, word: str, own: Collection[str]) -> str:
+def _no_word(word: str, own: Collection[str]) -> str:
     """Returns what to do with a word too many that is not an option."""
     if "=" in word and "set" in own:
         return f"; write --set {word}"
-    if command == "results":
-        return f"; the page of a result is results/{word}/report.html"
     if "set" in own:
         return "; give one scenario, or several to 'phonotaxis compare'"
     return ""

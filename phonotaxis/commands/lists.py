@@ -153,18 +153,19 @@ def _add_results_arguments(parser: ArgumentParser) -> None:
 
 def _results_in(given: str) -> list[Path]:
     """Returns a result directory itself, or the result directories in a folder."""
+    from analysis.report.result_directory import RESULTS
     from systems.framework.input_error import InputError
 
     path = Path(given).expanduser()
-    if _is_result(path):
-        return [path]
+    for each in (path, Path(RESULTS) / path):
+        if _is_result(each):
+            return [each]
     found = sorted(each for each in path.glob("*/") if _is_result(each))
     if not found:
-        raise InputError(
-            "dir",
-            f"{given!r} has no results; give a directory that --out of another command "
-            "has named",
-        )
+        remedy = "give a directory that --out of another command has named"
+        if given.isdecimal():
+            remedy = f"the page of a result is {RESULTS}/{given}/report.html"
+        raise InputError("dir", f"{given!r} has no results; {remedy}")
     return found
 
 

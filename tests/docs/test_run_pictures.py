@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,10 +30,9 @@ def test_rates_of_laws_are_those_of_the_summary() -> None:
         sum(n for cause, n in cell["causes"].items() if cause.startswith("collision"))
         for cell in cells
     ]
-    panels = [
-        axes.containers[0].lines[0].get_xdata() for axes in plot_law_rates().axes[1::4]
-    ]
-    assert [x * 100 for panel in panels for x in panel] == pytest.approx(counted)
+    panels: list[Any] = plot_law_rates().axes[1::4]
+    drawn = [panel.containers[0].lines[0].get_xdata() for panel in panels]
+    assert [100 * x for values in drawn for x in values] == pytest.approx(counted)
 
 
 @pytest.mark.slow
