@@ -37,14 +37,6 @@ FAMILIES = (
 #: dot, and between what they are looked for, by ratio.
 RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "stop_when_near": {"stop_m": (0.15, 1.2)},
-    "dwa": {
-        "heading_gain": (0.2, 4.0),
-        "distance_gain": (0.1, 4.0),
-        "speed_gain": (0.1, 4.0),
-        "clearance_m": (0.01, 0.2),
-        "farthest_m": (0.8, 3.0),
-        "turn_acceleration_rad_s2": (2.0, 10.0),
-    },
     "vfh_plus": {
         "window_m": (0.8, 2.5),
         "low_threshold": (0.1, 20.0),

@@ -19,6 +19,7 @@ NUMBERS = WindowNumbers((2.0, 0.2, 0.2), HALF, 0.0, 0.2, 0.7, 0.075)
 AHEAD = 3.0, 0.0, 2.8
 START = 0.0, 0.0, 0.0
 NOTHING = np.empty((0, 3))
+FREE = NOTHING, NOTHING
 
 
 def places(*points):
