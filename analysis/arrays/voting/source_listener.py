@@ -37,6 +37,10 @@ _OVERLAP = 1.5
 # from simulated rooms.
 _OF_ROWS = 3.0
 
+# Exponent of the share in the votes of single bins, in the geometric mean with the
+# share in the steered votes.
+_OF_BINS = 0.4
+
 
 class ListenerParameters(Parameters):
     """Parameters that determine how votes for directions become tracks of sources."""
@@ -195,7 +199,11 @@ def _tracked(
 
 
 def _detection(source: VotedSource, shape: ArrayShape) -> VotedSource:
-    """Returns a source with the errors of a single detection.
+    """Returns a source with the share and the errors of a single detection.
+
+    A reflection that interferes with the direct sound turns the votes of single bins,
+    even many of them in a short span of time. The steered response joins all
+    frequencies, so its votes stay with the source. A source must have a share of both.
 
     All reflections at a row have shorter delays than sound along the row, so they turn
     bearings toward the normal of the row, the more the farther these are from it.
@@ -205,7 +213,12 @@ def _detection(source: VotedSource, shape: ArrayShape) -> VotedSource:
         normal = math.atan2(shape.ahead[1], shape.ahead[0])
         common *= math.hypot(1.0, _OF_ROWS * math.sin(2.0 * (source.bearing - normal)))
     own = _OVERLAP * math.sqrt(source.own_variance)
-    return source._replace(bearing_std=math.hypot(own, common), common_std=common)
+    share = source.share
+    if source.steered_share is not None:
+        share = share**_OF_BINS * source.steered_share ** (1.0 - _OF_BINS)
+    return source._replace(
+        share=share, bearing_std=math.hypot(own, common), common_std=common
+    )
 
 
 def _between(votes: DirectionVotes, begin: float, end: float) -> DirectionVotes:

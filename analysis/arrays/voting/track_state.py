@@ -110,8 +110,9 @@ class SourceTrack:
     share: float
     """Mean share of the sound that its detections had in their steps, 0 to 1."""
     common_std: float = 0.0
-    """Standard deviation of the error that is common to the latest detections, rad. The
-    filter does not reduce it, so it is not part of ``covariance``."""
+    """Standard deviation of the error that is common to the latest detections, rad. It
+    includes the scatter of the detections beyond their own errors, which reflections
+    cause. The filter does not reduce it, so it is not part of ``covariance``."""
 
     @property
     def confidence(self) -> float:
@@ -199,6 +200,8 @@ def heard(
     ratio += p.detection_probability * height / density
     sounding, silent = track.sounding * ratio, track.silent
     whole = sounding + silent + 1.0 - track.confidence
+    # Detections that scatter more than stated have an error that changes slowly.
+    common = detection.common_std**2 + max(off**2 - variance, 0.0)
     elevation = detection.elevation
     if elevation is not None and track.elevation is not None:
         elevation = 0.7 * track.elevation + 0.3 * elevation
@@ -213,7 +216,7 @@ def heard(
         t_heard=t_s,
         hits=track.hits + 1,
         share=track.share + (detection.share - track.share) / (track.hits + 1),
-        common_std=0.7 * track.common_std + 0.3 * detection.common_std,
+        common_std=math.sqrt(0.7 * track.common_std**2 + 0.3 * common),
     )
 
 

@@ -40,9 +40,7 @@ _LEAST_SHARE = 0.17
 # _OF_BINS: exponent of the density of single bins in the geometric mean.
 # _ANYWHERE: share of each density that is spread over all directions. It preserves a
 #   source that has few votes in one of the two densities.
-# _OF_SHARE: exponent of the share in the votes of single bins, in the geometric mean
-#   with the share in the steered votes.
-_OF_BINS, _ANYWHERE, _OF_SHARE = 0.6, 0.1, 0.4
+_OF_BINS, _ANYWHERE = 0.6, 0.1
 
 # Least number of single bins that vote for a source.
 _LEAST_VOTES = 15.0
@@ -87,8 +85,7 @@ class VotedSource(NamedTuple):
     """Scatter of the elevations of the votes, rad. Errors in common do not average out,
     so it is that of one vote."""
     share: float
-    """Share of the total weight of all votes, 0 to 1. If both kinds of votes decide, it
-    is a geometric mean of the shares in both."""
+    """Share of the total weight of all votes, 0 to 1."""
     power: float
     """Sum of the A-weighted power of its votes."""
     rises: float
@@ -103,6 +100,9 @@ class VotedSource(NamedTuple):
     common_std: float = 0.0
     """Part of ``bearing_std`` from reflections that move all votes alike, rad. It is
     about the same in consecutive spans of time."""
+    steered_share: float | None = None
+    """Share of the steered votes that are near the bearing, 0 to 1. None if only one
+    kind of votes decides."""
 
     @property
     def own_variance(self) -> float:
@@ -142,7 +142,6 @@ def gather_sources(
     used = used.part(level, slice(0))
     steered = steered.part(without_steep(steered.elevation), slice(0))
     if used.azimuth.size:
-        agree &= steered.azimuth.size > 0
         found += _level_sources(used, steered if agree else None, whole, least)
     found = [source for source in found if source.votes >= least]
     most = max((source.share for source in found), default=0.0)
@@ -215,7 +214,7 @@ def _level_sources(
     """Finds the sources that are not steep, from votes and from steered votes."""
     azimuth, weight = votes.azimuth, votes.weight
     density, centers = _density(azimuth, weight)
-    if steered is not None:
+    if steered is not None and steered.azimuth.size:
         other, _ = _density(steered.azimuth, steered.weight)
         density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
     peaks = _peaks(density)
@@ -277,9 +276,6 @@ def _source(
     if not mine.any():
         return None
     found = voted_bearing(votes.part(mine, slice(0)), steered, bearing)
-    share = float(weight[mine].sum()) / whole
-    if steered is not None:
-        share = share**_OF_SHARE * _steered_share(steered, bearing) ** (1.0 - _OF_SHARE)
     heights = votes.elevation[mine]
     measured = bool(np.isfinite(heights).all())
     return VotedSource(
@@ -287,24 +283,19 @@ def _source(
         bearing_std=found.std,
         elevation=float(np.median(heights)) if measured else None,
         elevation_std=_scatter(heights) if measured else None,
-        share=share,
+        share=float(weight[mine].sum()) / whole,
         power=float(votes.power[mine].sum()),
         rises=float(votes.rises[mine].mean()),
         votes=count,
         confidence=0.0,
         common_std=found.common_std,
+        steered_share=None if steered is None else _near_share(steered, bearing),
     )
 
 
-def _steered_share(steered: DirectionVotes, bearing: float) -> float:
-    """Returns the share of the steered votes that are near a bearing.
-
-    A reflection that interferes with the direct sound turns the votes of single bins,
-    even of many if few pairs of microphones check them. The steered response joins all
-    frequencies, so its votes stay with the source.
-    """
-    near = np.abs(wrapped(steered.azimuth - bearing)) < NEAR_RAD
-    return float(steered.weight[near].sum() / steered.weight.sum())
+def _near_share(votes: DirectionVotes, bearing: float) -> float:
+    near = np.abs(wrapped(votes.azimuth - bearing)) < NEAR_RAD
+    return float(votes.weight[near].sum()) / max(float(votes.weight.sum()), 1e-12)
 
 
 def _scatter(angles: NDArray[np.float64]) -> float:
