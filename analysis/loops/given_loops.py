@@ -93,7 +93,7 @@ def margins(loop: Any) -> LoopMargins:
     Raises:
         InputError: ``loop`` is not a model, or has several inputs or outputs.
     """
-    return loop_margins(_model(loop))
+    return loop_margins(as_linear_model(loop))
 
 
 def disk_margin(loop: Any, skew: float = 0.0) -> MultiloopDiskMargin:
@@ -114,10 +114,10 @@ def disk_margin(loop: Any, skew: float = 0.0) -> MultiloopDiskMargin:
     """
     if not -1.0 <= skew <= 1.0:
         raise InputError("skew", f"is {skew:g}; give a number from -1 to 1")
-    return multiloop_disk_margin(_model(loop), skew)
+    return multiloop_disk_margin(as_linear_model(loop), skew)
 
 
-def _model(loop: Any) -> LinearModel:
+def as_linear_model(loop: Any) -> LinearModel:
     """Converts a model of any accepted type."""
     if isinstance(loop, LinearModel):
         return loop
