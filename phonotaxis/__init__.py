@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from analysis.batches.plan import SweepPlan
     from analysis.loops.diagram_linearization import linearize
     from analysis.loops.given_loops import disk_margin, loop_at, margins
+    from analysis.loops.given_robustness import Robustness, robustness
     from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
@@ -59,6 +60,7 @@ __all__ = [
     "LocateResult",
     "ResolutionResult",
     "Result",
+    "Robustness",
     "RunError",
     "RunResult",
     "Scenario",
@@ -86,6 +88,7 @@ __all__ = [
     "loop_at",
     "main",
     "margins",
+    "robustness",
     "scenarios",
     "simulate",
     "simulate_laws",
@@ -111,6 +114,7 @@ _HOMES = {
     "LocateResult": "phonotaxis.recordings",
     "ResolutionResult": "phonotaxis.arrays",
     "Result": "phonotaxis.result",
+    "Robustness": "analysis.loops.given_robustness",
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
@@ -130,6 +134,7 @@ _HOMES = {
     "laws": "phonotaxis.listings",
     "loop_at": "analysis.loops.given_loops",
     "margins": "analysis.loops.given_loops",
+    "robustness": "analysis.loops.given_robustness",
     "library_scenarios": "diagrams.scenario.loading",
     "linearize": "analysis.loops.diagram_linearization",
     "listen": "phonotaxis.listening",

@@ -64,21 +64,17 @@ class Robustness:
         unstable = (
             "no unstable loop found"
             if math.isinf(self.scale_unstable)
-            else f"unstable at {self.scale_unstable:.4g}"
+            else f"unstable at {self.scale_unstable:.5g}"
         )
-        return "\n".join(
-            [
-                self.verdict,
-                f"largest growth rate: {self.growth_per_s:.6g} 1/s found, at most "
-                f"{self.proven_growth_per_s:.6g} 1/s proven (gap "
-                f"{100 * self.gap:.2g} %)",
-                f"worst case found: {values}",
-                f"scale of the box: proven stable up to {self.scale_proven:.4g}, "
-                f"{unstable} (examined up to {self.scale_largest:.4g})",
-                f"{self.parts} parts, {self.computing_time_s:.2f} s, error of the "
-                f"polynomials {self.fit_error:.1e}",
-            ]
-        )
+        growth, proven = self.growth_per_s, self.proven_growth_per_s
+        gap, stable = 100.0 * self.gap, self.scale_proven
+        return f"""{self.verdict}
+largest growth rate: {growth:.6g} 1/s found, at most {proven:.6g} 1/s (gap {gap:.2g} %)
+worst case found: {values}
+scale of the box: proven stable up to {stable:.5g}, {unstable} (tried up to \
+{self.scale_largest:.4g})
+{self.parts} parts, {self.computing_time_s:.2f} s, error of the polynomials \
+{self.fit_error:.1e}"""
 
 
 def robustness(

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from systems.framework.input_error import InputError
 
-#: Numbers of Chebyshev nodes on which the degree of one parameter is determined: first
-#: few, which suffice for low degrees.
-_SLICE_NODES = (8, 26)
+#: Numbers of Chebyshev nodes on which the degree of one parameter is determined, and
+#: the share of the size below which the last coefficients are rounding errors. Few
+#: nodes suffice for low degrees. Many nodes permit the larger errors of stiff loops.
+_SLICES = ((8, 1e-11), (26, 1e-6))
 #: Largest number of coefficients of one polynomial.
 _MOST_COEFFICIENTS = 20_000
 #: Chebyshev coefficients below this share of the largest one are left out.
@@ -28,8 +29,8 @@ _NEGLIGIBLE = 1e-11
 #: Number of the last Chebyshev coefficients, which show the size of rounding errors,
 #: and the ratio below which another coefficient counts as such an error.
 _TAIL, _TAIL_RATIO = 4, 10.0
-#: Share of the largest of all coefficients below which a tail is a rounding error.
-_NOISE = 1e-12
+#: Share of the largest size below which a size is that of rounding errors.
+_SMALL = 1e-2
 #: Number of random points at which the error is measured.
 _CHECKS = 40
 #: Assumed ratio of the largest error in the box and the largest measured error.
@@ -137,12 +138,12 @@ def _axis(
 ) -> Axis:
     """Chooses the parameter or its reciprocal, whichever needs the lower degree."""
     kinds = (False, True) if low * high > 0.0 else (False,)
-    for count in _SLICE_NODES:
+    for count, noise in _SLICES:
         found = []
         for reciprocal in kinds:
             whole = Axis(low, high, reciprocal, count - 1)
             slices = [_slice(function, point, k, whole) for point in points]
-            needed = [_needed_degree(values) for values in slices]
+            needed = [_needed_degree(values, noise) for values in slices]
             if None not in needed:
                 found.append(Axis(low, high, reciprocal, max(map(int, needed))))
         if found:
@@ -166,16 +167,17 @@ def _slice(
     return np.array(rows)
 
 
-def _needed_degree(values: NDArray[np.float64]) -> int | None:
+def _needed_degree(values: NDArray[np.float64], noise: float) -> int | None:
     """Least degree of polynomials through values at Chebyshev nodes, up to rounding.
 
-    None means that the values need a higher degree than the nodes show.
+    None means that the last coefficients are above the share ``noise`` of the size, so
+    that the values need a higher degree than the nodes show.
     """
     count = len(values)
     coefficients = np.abs(_to_chebyshev(count) @ values)
     sizes = coefficients.max(axis=0)
     tail = coefficients[-_TAIL:].max(axis=0)
-    if (tail > np.maximum(_NEGLIGIBLE * sizes, _NOISE * sizes.max())).any():
+    if (tail > noise * np.maximum(sizes, _SMALL * sizes.max())).any():
         return None
     least = np.maximum(_NEGLIGIBLE * sizes, _TAIL_RATIO * tail)
     kept = (coefficients > least).any(axis=1)
