@@ -58,6 +58,13 @@ class Axis:
         start, end = 1.0 / self.low, 1.0 / self.high
         return 1.0 / (start + share * (end - start))
 
+    def share(self, value: float) -> float:
+        """Converts a value of the parameter to its position in the interval."""
+        if not self.reciprocal:
+            return (value - self.low) / (self.high - self.low)
+        start, end = 1.0 / self.low, 1.0 / self.high
+        return (1.0 / value - start) / (end - start)
+
 
 @dataclass(frozen=True)
 class ParameterPolynomial:

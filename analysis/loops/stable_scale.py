@@ -21,8 +21,6 @@ from systems.framework.input_error import InputError
 _MOST_SCALE = 10.0
 #: A parameter that is positive in the box stays above this share of its nominal value.
 _LEAST_SHARE = 0.05
-#: Ratio of the two bounds at which the search ends.
-_CLOSE = 1.002
 #: Smallest scale that is examined.
 _SMALLEST = 1e-3
 
@@ -47,7 +45,12 @@ class StableScale:
 
 
 def stable_scale(
-    families_of: FamiliesOf, low: Vector, nominal: Vector, high: Vector
+    families_of: FamiliesOf,
+    low: Vector,
+    nominal: Vector,
+    high: Vector,
+    *,
+    close: float = 1.002,
 ) -> StableScale:
     """Bounds the largest scale of a box in which all loops are stable.
 
@@ -56,14 +59,15 @@ def stable_scale(
         low: (p,) lower ends of the box at scale 1.
         nominal: (p,) parameters about which the box is scaled.
         high: (p,) upper ends of the box at scale 1.
+        close: Ratio of the two bounds at which the search ends, if each proof succeeds.
 
     Returns:
-        The scale from both sides. They differ by at most 0.2 % if each proof succeeds.
+        The scale from both sides.
     """
     largest = _largest(low, nominal, high)
     proven, unstable = 0.0, math.inf
     top, scale = math.inf, largest  # at top, stability is not proven
-    while proven < largest and top > max(_CLOSE * proven, _SMALLEST):
+    while proven < largest and top > max(close * proven, _SMALLEST):
         ends = [nominal + scale * (end - nominal) for end in (low, high)]
         outcome = _outcome(families_of, *ends)
         if outcome == "stable":
@@ -72,7 +76,8 @@ def stable_scale(
             top = scale
         if outcome == "unstable":
             unstable = scale
-        scale = 0.5 * (proven + top)
+        first = proven == 0.0 and top == largest
+        scale = _SMALLEST if first else 0.5 * (proven + top)
     return StableScale(proven, unstable, largest)
 
 
@@ -105,4 +110,4 @@ def _largest(low: Vector, nominal: Vector, high: Vector) -> float:
         inner = min(abs(least), abs(most))
         if least * most > 0.0 and abs(middle) > inner:
             room.append((1.0 - _LEAST_SHARE) * abs(middle) / (abs(middle) - inner))
-    return min(room)
+    return float(min(room))
