@@ -33,9 +33,9 @@ class LoopBound:
     proven_growth_per_s: float
     """Growth rate that is not exceeded, 1/s. Infinite if nothing was proven."""
     model_error_per_s: float
-    """Largest difference of the growth rates of the loop and of the family of loops, at
-    the random points of the box, 1/s. ``proven_growth_per_s`` contains ten times this
-    difference."""
+    """Largest difference of the growth rates of the loop and of the family of loops,
+    1/s, where they were compared: at the random points of the box, or at the nominal
+    parameters. ``proven_growth_per_s`` contains ten times this difference."""
     scale_proven: float
     """The box may grow by this factor about the nominal parameters, and all loops are
     still proven stable."""
@@ -48,12 +48,16 @@ class LoopBound:
     computing_time_s: float
 
 
-def bound_loop(families_of: BoxFamilies, cloud: PoleCloud) -> LoopBound:
+def bound_loop(
+    families_of: BoxFamilies, cloud: PoleCloud, known_error_per_s: float = 0.0
+) -> LoopBound:
     """Proves a bound of the growth rate over the box of a pole cloud.
 
     Args:
         families_of: The loops in a box. Their poles must be those of the cloud.
         cloud: Poles at random points.
+        known_error_per_s: Difference of the growth rates of the loop and of the family,
+            1/s, if the poles of the cloud are those of the family.
 
     Returns:
         The bound, and the scale of the box up to which all loops are stable.
@@ -65,7 +69,7 @@ def bound_loop(families_of: BoxFamilies, cloud: PoleCloud) -> LoopBound:
     scale = _scale(families_of, cloud.parameters)
     box = _box(cloud.parameters, [(p.low, p.high) for p in cloud.parameters])
     bounds = [bound_growth(family) for family in families_of(box)]
-    error = _model_error(families_of, cloud)
+    error = max(known_error_per_s, _model_error(families_of, cloud))
     if error > _SAME:
         raise InputError(
             "law",
@@ -103,12 +107,10 @@ def _model_error(families_of: BoxFamilies, cloud: PoleCloud) -> float:
 def _scale(
     families_of: BoxFamilies, parameters: Sequence[UncertainParameter]
 ) -> tuple[float, float, float]:
-    """Scales proven, unstable and largest. Whole numbers keep their whole range."""
-    free = [p for p in parameters if not p.whole]
-    fixed = _box(
-        [p for p in parameters if p.whole],
-        [(p.low, p.high) for p in parameters if p.whole],
-    )
+    """Scales proven, unstable and largest. Other intervals stay the same."""
+    free = [p for p in parameters if p.scaled and not p.whole]
+    others = [p for p in parameters if p not in free]
+    fixed = _box(others, [(p.low, p.high) for p in others])
 
     def families(low: Vector, high: Vector) -> Sequence[Family]:
         ends = list(zip(low.tolist(), high.tolist(), strict=True))

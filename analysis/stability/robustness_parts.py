@@ -6,6 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from analysis.loops.heading_families import (
+    heading_families,
+    heading_poles,
+    heading_uncertainty,
+)
 from analysis.loops.linear_plots import plot_pole_cloud, plot_sensitivities
 from analysis.loops.loop_bound import LoopBound, bound_loop
 from analysis.loops.motion_families import (
@@ -28,6 +33,12 @@ from analysis.loops.robustness import (
 from analysis.report.criterion import Bounds, Criterion, Reading
 from analysis.report.plain_values import pick
 from analysis.report.section import Column, Content, Figure, Table, number
+from analysis.routes.route_families import (
+    nominal_difference,
+    route_families,
+    route_poles,
+    route_uncertainty,
+)
 from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
 from systems.framework.input_error import InputError
@@ -62,13 +73,14 @@ def loop_robustness(
     parameters: tuple[UncertainParameter, ...],
     *,
     samples: int,
+    known_error_per_s: float = 0.0,
 ) -> LoopRobustness:
     """Computes how the poles of a sampled loop depend on uncertain parameters.
 
     Each uncertain parameter has an interval. All intervals together form a box.
     ``poles`` is a function from parameter values to the poles of the loop in the z
     plane, and ``families`` from a box to the same loops. ``samples`` is the number of
-    random points in the box.
+    random points in the box. ``known_error_per_s`` is that of ``bound_loop``.
     """
     cloud = pole_cloud(
         poles,
@@ -79,7 +91,7 @@ def loop_robustness(
     )
     bound: LoopBound | str
     try:
-        bound = bound_loop(families, cloud)
+        bound = bound_loop(families, cloud, known_error_per_s)
     except InputError as error:
         bound = str(error)
     sensitivities = pole_sensitivities(poles, parameters, period=scenario.tick_s)
@@ -103,6 +115,29 @@ def _before_an_obstacle(study: Study) -> LoopRobustness:
         contact_poles(study.scenario),
         contact_families(study.scenario),
         contact_uncertainty(study.scenario),
+        samples=4 * _SAMPLES[study.full],
+    )
+
+
+def _on_a_route(study: Study) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        route_poles(scenario),
+        route_families(scenario),
+        route_uncertainty(scenario),
+        samples=4 * _SAMPLES[study.full],
+        known_error_per_s=nominal_difference(scenario, study.need("frozen_gains")),
+    )
+
+
+def _of_the_heading(study: Study) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        heading_poles(scenario),
+        heading_families(scenario),
+        heading_uncertainty(scenario),
         samples=4 * _SAMPLES[study.full],
     )
 
@@ -143,10 +178,10 @@ def bound_text(bound: LoopBound | str, found_per_s: float) -> str:
         f"{number(proven, 5)} 1/s. The worst case found has {number(found_per_s, 5)} "
         f"1/s, so that the gap is {number(100.0 * gap, 2)} %. {scale} The proof "
         f"(zero exclusion with Bernstein coefficients, {bound.parts} parts, "
-        f"{number(bound.computing_time_s, 2)} s) is about a reduced loop. At the random "
-        "points, its growth rate differs from that of the loop by at most "
-        f"{number(bound.model_error_per_s, 2)} 1/s, and the bound allows for ten times "
-        "this difference."
+        f"{number(bound.computing_time_s, 2)} s) is about a reduced loop. Its growth "
+        "rate differs from that of the loop by at most "
+        f"{number(bound.model_error_per_s, 2)} 1/s where both were compared, and the "
+        "bound allows for ten times this difference."
     )
 
 
@@ -226,6 +261,40 @@ CONTACT_ROBUSTNESS = Part[LoopRobustness](
             "growth before an obstacle, worst parameters", "1/s", "below", 0.0,
             "it comes to rest before an obstacle for all parameters in their ranges",
             "some parameters in their ranges make it swing where the law is stiffest",
+            "stability over the ranges of all parameters",
+            lambda data: data.growth_per_s,
+        ),
+    ),
+    document=_document,
+)  # fmt: skip
+
+ROUTE_ROBUSTNESS = Part[LoopRobustness](
+    "route_robustness",
+    "Robustness on the route and before a wall",
+    _on_a_route,
+    _show,
+    criteria=(
+        Criterion(
+            "growth with frozen gains, worst parameters", "1/s", "below", 0.0,
+            "small deviations die out for all parameters in their ranges",
+            "small deviations grow for some parameters in their ranges",
+            "stability over the ranges of all parameters",
+            lambda data: data.growth_per_s,
+        ),
+    ),
+    document=_document,
+)  # fmt: skip
+
+HEADING_ROBUSTNESS = Part[LoopRobustness](
+    "heading_robustness",
+    "Robustness of the heading",
+    _of_the_heading,
+    _show,
+    criteria=(
+        Criterion(
+            "growth of the heading, worst parameters", "1/s", "below", 0.0,
+            "it turns to its heading for all parameters in their ranges",
+            "some parameters in their ranges make it swing about its heading",
             "stability over the ranges of all parameters",
             lambda data: data.growth_per_s,
         ),

@@ -46,7 +46,7 @@ def test_the_worst_oscillator_is_the_closed_form(kind):
 @pytest.mark.parametrize("period", [None, 0.5])
 def test_random_families_are_not_worse_than_proven(period):
     rng = np.random.default_rng(3)
-    for n in (3, 5, 9):
+    for n in (3, 7):
         A = rng.normal(size=(n, n))
         A -= np.eye(n) * (np.linalg.eigvals(A).real.max() + 0.3)
         if period:
@@ -60,7 +60,7 @@ def test_random_families_are_not_worse_than_proven(period):
 
         box = dict.fromkeys("abc", (-1.0, 1.0))
         found = phonotaxis.robustness(matrix, box, period_s=period)
-        points = rng.uniform(-1.0, 1.0, (1500, 3))
+        points = rng.uniform(-1.0, 1.0, (400, 3))
         poles = [
             np.linalg.eigvals(matrix(dict(zip("abc", row, strict=True))))
             for row in points
