@@ -145,16 +145,21 @@ def _axis(
 ) -> Axis:
     """Chooses the parameter or its reciprocal, whichever needs the lower degree."""
     kinds = (False, True) if low * high > 0.0 else (False,)
-    for count, noise in _SLICES:
-        found = []
+    for (count, noise), places in zip(_SLICES, (points, points[:1]), strict=True):
+        best = None
         for reciprocal in kinds:
             whole = Axis(low, high, reciprocal, count - 1)
-            slices = [_slice(function, point, k, whole) for point in points]
+            slices = [_slice(function, place, k, whole) for place in places]
             needed = [_needed_degree(values, noise) for values in slices]
-            if None not in needed:
-                found.append(Axis(low, high, reciprocal, max(map(int, needed))))
-        if found:
-            return min(found, key=lambda axis: axis.degree)
+            if None in needed:
+                continue
+            degree = max(map(int, needed))
+            if best is None or degree < best.degree:
+                best = Axis(low, high, reciprocal, degree)
+            if degree <= 1:
+                break
+        if best is not None:
+            return best
     raise InputError(
         "box",
         f"the matrix is not smooth enough over [{low:g}, {high:g}]; narrow this "
