@@ -80,21 +80,20 @@ class Family:
         """
         self.matrix_of, self.period_s = matrix_of, period_s
         self.low, self.high = low, high
-        poles = np.linalg.eigvals(matrix_of(0.5 * (low + high)))
-        sizes = np.abs(self._rates(poles))
+        sizes = np.abs(self._rates(0.5 * (low + high)))
         self._scale = float(np.exp(np.log(np.maximum(sizes, 1e-9)).mean()))
 
-    def _rates(self, poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """(z - 1)/T for sampled poles, and s for continuous ones."""
-        return (poles - 1.0) / self.period_s if self.period_s else poles
+    def _rates(self, values: Vector) -> NDArray[np.complex128]:
+        """(n,) values of (z - 1)/T for sampled poles z, or poles s, 1/s."""
+        poles = np.linalg.eigvals(self.matrix_of(values)).astype(np.complex128)
+        return np.asarray((poles - 1.0) / self.period_s) if self.period_s else poles
 
     @cached_property
     def polynomial(self) -> ParameterPolynomial:
         """Characteristic polynomial of (A - I)/T or of A, with scaled roots."""
 
         def coefficients(values: Vector) -> Vector:
-            poles = np.linalg.eigvals(self.matrix_of(values))
-            return np.real(np.poly(self._rates(poles) / self._scale))
+            return np.real(np.poly(self._rates(values) / self._scale))
 
         return fit_polynomial(coefficients, self.low, self.high)
 
@@ -103,21 +102,22 @@ class Family:
 
         The poles are those of the fitted polynomial.
         """
-        rates = np.roots(self.polynomial.values(shares)) * self._scale
-        return self._largest(1.0 + rates * self.period_s if self.period_s else rates)
+        roots = np.roots(self.polynomial.values(shares)).astype(np.complex128)
+        return self._largest(np.asarray(roots * self._scale))
 
-    def _largest(self, poles: NDArray[np.complex128]) -> tuple[float, complex]:
+    def _largest(self, rates: NDArray[np.complex128]) -> tuple[float, complex]:
         if not self.period_s:
-            pole = complex(poles[np.argmax(poles.real)])
+            pole = complex(rates[np.argmax(rates.real)])
             return pole.real, pole
-        z = poles[[np.argmax(np.abs(poles))]]
+        z = 1.0 + rates * self.period_s
+        z = z[[np.argmax(np.abs(z))]]
         found = s_plane(z, self.period_s)
         growth = float(growth_per_s(np.abs(z[0]), self.period_s))
         return growth, complex(found[0]) if len(found) else complex(growth)
 
     def exact_growth(self, values: Vector) -> float:
         """Largest growth rate with given parameters, from the matrix itself, 1/s."""
-        return self._largest(np.linalg.eigvals(self.matrix_of(values)))[0]
+        return self._largest(self._rates(values))[0]
 
     def exclude(self, growth: float, near: float, most_parts: int) -> Exclusion:
         """Tries to prove that no loop grows faster.

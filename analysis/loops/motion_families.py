@@ -195,13 +195,13 @@ class _PrincipalStiffness:
             wide = (shares[0] * (1.0 - 1e-9), shares[1] * (1.0 + 1e-9))
             fitted = fit_polynomial(self._matrix, *np.array(wide)[:, None])
             self._fitted = fitted
-        ends = [fitted.axes[0].share(share) for share in shares]
+        low, high = (fitted.axes[0].share(share) for share in shares)
         steps = _STEPS if shares[1] > shares[0] else 1
         values = np.linalg.eigvals(
             np.array(
                 [
                     fitted.values(np.array([u])).reshape(2, 2)
-                    for u in np.linspace(*ends, steps)
+                    for u in np.linspace(low, high, steps)
                 ]
             )
         )

@@ -151,9 +151,10 @@ def _axis(
             whole = Axis(low, high, reciprocal, count - 1)
             slices = [_slice(function, place, k, whole) for place in places]
             needed = [_needed_degree(values, noise) for values in slices]
-            if None in needed:
+            known = [degree for degree in needed if degree is not None]
+            if len(known) < len(needed):
                 continue
-            degree = max(map(int, needed))
+            degree = max(known)
             if best is None or degree < best.degree:
                 best = Axis(low, high, reciprocal, degree)
             if degree <= 1:
@@ -199,7 +200,8 @@ def _needed_degree(values: NDArray[np.float64], noise: float) -> int | None:
 @lru_cache(maxsize=4)
 def _to_chebyshev(count: int) -> NDArray[np.float64]:
     places = 2.0 * _nodes(count - 1) - 1.0
-    return np.linalg.inv(np.polynomial.chebyshev.chebvander(places, count - 1))
+    inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(places, count - 1))
+    return np.asarray(inverse, dtype=float)
 
 
 @lru_cache(maxsize=64)

@@ -80,7 +80,7 @@ class Criterion(Generic[Data]):
             return self.without_number(value)
         proven = None
         if isinstance(value, Bounds):
-            value, proven = value.found, value.proven
+            proven, value = value.proven, value.found
         if math.isnan(value):
             return self.without_number("there is no such number")
         met = self.met_by(value)

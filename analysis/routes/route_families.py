@@ -8,6 +8,7 @@ heading. The gains are constant.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ def route_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
 
 
 def lateral_matrix(
-    mass: float, lag: float, damping: float, stiffness: float, scenario: Scenario
+    scenario: Scenario, mass: float, lag: float, damping: float, stiffness: float
 ) -> NDArray[np.float64]:
     """Computes the matrix A of the motion across a straight route over one period.
 
@@ -92,12 +93,12 @@ def lateral_matrix(
         v+ = v - T/M (K (y + e theta) + D v),  u = (v+ - V theta)/e
 
     Args:
+        scenario: Scenario with the control period T, the speed V, and the distance e
+            from the axle to P.
         mass: Virtual mass M, kg.
         lag: Motor lag, s.
         damping: Damping D, N s/m.
         stiffness: Stiffness K, N/m.
-        scenario: Scenario with the control period T, the speed V, and the distance e
-            from the axle to P.
 
     Returns:
         (4, 4) matrix A. The state is y, theta, w, v.
@@ -142,7 +143,7 @@ def route_families(scenario: Scenario) -> BoxFamilies:
         found = [
             axis_family(scenario, box, spring, damper),
             interval_family(
-                lambda *row: lateral_matrix(*row, scenario),
+                partial(lateral_matrix, scenario),
                 [masses, lags, damper, spring],
                 scenario.tick_s,
             ),
