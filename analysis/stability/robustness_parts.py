@@ -46,6 +46,8 @@ from systems.framework.input_error import InputError
 #: Number of random points in the parameter box, in a short and in a full report. The
 #: analysis of contact takes four times as many.
 _SAMPLES = (25, 200)
+#: Difference of growth rates that counts as rounding, 1/s.
+_ROUNDING_PER_S = 1e-10
 
 
 @dataclass(frozen=True)
@@ -173,15 +175,19 @@ def bound_text(bound: LoopBound | str, found_per_s: float) -> str:
             "ranges about the nominal values, and an unstable loop was found in "
             f"{number(bound.scale_unstable)} times the ranges."
         )
+    reduced = ""
+    if bound.model_error_per_s > _ROUNDING_PER_S:
+        reduced = (
+            " It is about a reduced loop. Where both were compared, the growth rates "
+            f"differ by at most {number(bound.model_error_per_s, 2)} 1/s, and the "
+            "bound allows for ten times this difference."
+        )
     return (
         f"It is proven that no values in the ranges have a growth rate above "
         f"{number(proven, 5)} 1/s. The worst case found has {number(found_per_s, 5)} "
-        f"1/s, so that the gap is {number(100.0 * gap, 2)} %. {scale} The proof "
-        f"(zero exclusion with Bernstein coefficients, {bound.parts} parts, "
-        f"{number(bound.computing_time_s, 2)} s) is about a reduced loop. Its growth "
-        "rate differs from that of the loop by at most "
-        f"{number(bound.model_error_per_s, 2)} 1/s where both were compared, and the "
-        "bound allows for ten times this difference."
+        f"1/s, so that the gap is {number(100.0 * gap, 2)} %. {scale} The proof is "
+        f"by zero exclusion with Bernstein coefficients, with {bound.parts} parts in "
+        f"{number(bound.computing_time_s, 2)} s.{reduced}"
     )
 
 
