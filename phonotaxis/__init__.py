@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from analysis.loops.given_delays import delay_margin
     from analysis.loops.given_loops import disk_margin, loop_at, margins
     from analysis.loops.given_oscillations import describing_function
+    from analysis.loops.given_robustness import Robustness, robustness
     from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
@@ -63,6 +64,7 @@ __all__ = [
     "LocateResult",
     "ResolutionResult",
     "Result",
+    "Robustness",
     "RunError",
     "RunResult",
     "Scenario",
@@ -94,6 +96,7 @@ __all__ = [
     "loop_burst_cycle",
     "main",
     "margins",
+    "robustness",
     "scenarios",
     "simulate",
     "simulate_laws",
@@ -120,6 +123,7 @@ _HOMES = {
     "LocateResult": "phonotaxis.recordings",
     "ResolutionResult": "phonotaxis.arrays",
     "Result": "phonotaxis.result",
+    "Robustness": "analysis.loops.given_robustness",
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
@@ -142,6 +146,7 @@ _HOMES = {
     "laws": "phonotaxis.listings",
     "loop_at": "analysis.loops.given_loops",
     "margins": "analysis.loops.given_loops",
+    "robustness": "analysis.loops.given_robustness",
     "library_scenarios": "diagrams.scenario.loading",
     "linearize": "analysis.loops.diagram_linearization",
     "listen": "phonotaxis.listening",

@@ -7,6 +7,7 @@ input. P is the control point ahead of the wheel axle.
 from __future__ import annotations
 
 import math
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -45,6 +46,13 @@ class ForceField:
         self._time_s = time_s or 0.0
         self._pose_WS = np.array(scenario.source.path().pose(self._time_s))
         self._contexts: dict[tuple[str, bool], Any] = {}
+        self._attraction_share = 1.0
+
+    def with_attraction(self, share: float) -> ForceField:
+        """Returns the field with an attraction that is ``share`` times as stiff."""
+        other = copy(self)
+        other._attraction_share = share
+        return other
 
     @property
     def p_WS(self) -> NDArray[np.float64]:
@@ -54,14 +62,14 @@ class ForceField:
     def force(self, p_WP: ArrayLike) -> NDArray[np.float64]:
         """(2,) sum of attraction and repulsion at ``p_WP`` in W, N."""
         forces = self._forces(np.asarray(p_WP, dtype=float), twin=False)
-        return np.asarray(forces[:2] + forces[2:], dtype=float)
+        return np.asarray(self._attraction_share * forces[:2] + forces[2:], dtype=float)
 
     def gradient(
         self, p_WP: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Returns the force (2,), N, and its derivative by position (2, 2), N/m."""
         forces = self._forces(seed(p_WP), twin=True)
-        return value_and_gradient(forces[:2] + forces[2:], 2)
+        return value_and_gradient(self._attraction_share * forces[:2] + forces[2:], 2)
 
     def damping(self, p_WP: ArrayLike) -> float:
         """Damping -dF_x/dv_x at ``p_WP`` for P at rest, N s/m.

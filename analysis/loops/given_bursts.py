@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from analysis.loops.given_loops import loop_model
+from analysis.loops.given_loops import as_linear_model
 from analysis.loops.linear_models import LinearModel
 from systems.framework.input_error import InputError
 
@@ -85,7 +85,7 @@ def loop_burst_cycle(
             periods.
         InputError: ``hold`` is unknown, or the loop is not square.
     """
-    model = loop_model(loop)
+    model = as_linear_model(loop)
     width = model.B.shape[1]
     if model.C.shape[0] != width:
         raise InputError(

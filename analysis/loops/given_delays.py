@@ -14,7 +14,7 @@ from pydrake.systems.framework import System
 from scipy.optimize import brentq
 
 from analysis.loops.diagram_linearization import linearized, map_over_period
-from analysis.loops.given_loops import OpenedLoop, loop_model, opened_loop
+from analysis.loops.given_loops import OpenedLoop, as_linear_model, opened_loop
 from analysis.loops.linear_models import NEUTRAL, LinearModel
 from analysis.loops.loop_margins import loop_margins
 from systems.framework.input_error import InputError
@@ -99,7 +99,7 @@ def delay_margin(loop: Any, context: Any = None, port: Any = None) -> LoopDelayM
         opened = opened_loop(loop, context, port)
         model = opened.model
     else:
-        opened, model = None, loop_model(loop)
+        opened, model = None, as_linear_model(loop)
     if model.period_s is None:
         return _continuous(model)
     if opened is not None and opened.read_after:

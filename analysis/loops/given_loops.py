@@ -135,7 +135,7 @@ def margins(loop: Any, *, delay_s: float = 0.0, unstable_poles: int = 0) -> Loop
     if isinstance(loop, FrequencyResponseData):
         given, stable = measured_response(loop, unstable_poles, delay_s)
         return response_margins(given, stable=stable)
-    model = loop_model(loop)
+    model = as_linear_model(loop)
     if not delay_s:
         return loop_margins(model)
     if model.period_s:
@@ -197,10 +197,10 @@ def disk_margin(loop: Any, skew: float = 0.0) -> MultiloopDiskMargin:
     """
     if not -1.0 <= skew <= 1.0:
         raise InputError("skew", f"is {skew:g}; give a number from -1 to 1")
-    return multiloop_disk_margin(loop_model(loop), skew)
+    return multiloop_disk_margin(as_linear_model(loop), skew)
 
 
-def loop_model(loop: Any) -> LinearModel:
+def as_linear_model(loop: Any) -> LinearModel:
     """Converts a model of any accepted type."""
     if isinstance(loop, LinearModel):
         return loop

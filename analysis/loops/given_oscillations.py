@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import root
 
 from analysis.loops.frequency_levels import frequency_grid
-from analysis.loops.given_loops import delayed_model, loop_model
+from analysis.loops.given_loops import as_linear_model, delayed_model
 from analysis.loops.linear_models import LinearModel
 from analysis.loops.loop_margins import loop_margins
 from analysis.loops.response_margins import (
@@ -162,7 +162,7 @@ def _loop(loop: Any, delay_s: float, unstable_poles: int) -> _Loop:
             math.pi / loop.dt if loop.dt else math.inf,
             lambda factor: nyquist_stable(measured.omega, factor * L, unstable_poles),
         )
-    model = loop_model(loop)
+    model = as_linear_model(loop)
     if model.B.shape[1] != 1 or model.C.shape[0] != 1:
         raise InputError(
             "loop",

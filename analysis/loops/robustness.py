@@ -51,6 +51,9 @@ class UncertainParameter:
     """Reason for the width of the interval."""
     whole: bool = False
     """Whether only whole numbers are possible."""
+    scaled: bool = True
+    """Whether the interval grows if the box is scaled. If not, or if only whole numbers
+    are possible, the interval is always the whole one."""
 
     def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high or self.low == self.high:
@@ -59,6 +62,15 @@ class UncertainParameter:
                 f"{self.nominal:g} is not within [{self.low:g}, {self.high:g}], or "
                 "its ends are equal; correct the interval",
             )
+
+
+#: Share of the true wheel radius, which the encoders do not measure.
+WHEEL_RADIUS = UncertainParameter(
+    "wheel_radius_share", "r", "1", 1.0, 0.98, 1.02,
+    "true radius over stated radius: wear, pressure",
+)  # fmt: skip
+#: Reason for the width of the interval of the motor lag.
+LAG_REASON = "not printed; load, battery"
 
 
 @dataclass(frozen=True)
@@ -253,7 +265,7 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
             f"{scenario.only.law!r} does not push harder as an obstacle comes nearer, "
             "so that it has no contact mode; choose another law",
         )
-    law = _share(
+    law = within_share(
         "law_stiffness_n_m", "K_law", "N/m", stiffness, 0.1, "largest slope -df/dc"
     )
     return (*_common(scenario), law)
@@ -262,24 +274,20 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
 def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     gains, robot = scenario.follower.attraction, scenario.only.robot
     printed = "printed without unit"
-    lag_reason = "not printed; load, battery"
     shares = (
         ("robot.mass_kg", "M", "kg", robot.mass_kg, 0.1, "virtual mass, as set"),
         ("attraction.stiffness_n_m", "K_r", "N/m", gains.stiffness_n_m, 0.1, printed),
         ("attraction.damping_n_s_m", "D_r", "N s/m", gains.damping_n_s_m, 0.1, printed),
         (
             "plant.motor_lag_s", "lag", "s", scenario.only.plant.motor_lag_s, 0.4,
-            lag_reason,
+            LAG_REASON,
         ),
     )  # fmt: skip
     return (
         # A parameter with the value zero is left out: the robot has no such spring,
         # damper or lag.
-        *(_share(*row) for row in shares if row[3] > 0.0),
-        UncertainParameter(
-            "wheel_radius_share", "r", "1", 1.0, 0.98, 1.02,
-            "true radius over stated radius: wear, pressure",
-        ),
+        *(within_share(*row) for row in shares if row[3] > 0.0),
+        WHEEL_RADIUS,
         UncertainParameter(
             "extra_ticks", "latency", f"{scenario.tick_s * 1e3:g} ms", 0.0, 0.0, 1.0,
             "a processor that needs one more tick; whole ticks", whole=True,
@@ -287,9 +295,10 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     )  # fmt: skip
 
 
-def _share(
+def within_share(
     name: str, symbol: str, unit: str, nominal: float, share: float, reason: str
 ) -> UncertainParameter:
+    """Returns a parameter that is within a share of its nominal value, both ways."""
     low, high = nominal * (1.0 - share), nominal * (1.0 + share)
     return UncertainParameter(name, symbol, unit, nominal, low, high, reason)
 

@@ -1,21 +1,38 @@
-"""Criteria for numbers, and the verdicts: pass, fail, or not applicable."""
+"""Criteria for numbers, and the verdicts."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from typing import Generic, Literal, TypeVar, cast
 
 #: Unit of a number that is 1 for true and 0 for false.
 YES_OR_NO = "yes or no"
 
-Judgement = Literal["pass", "fail", "not applicable"]
+Judgement = Literal["pass", "fail", "undecided", "not applicable"]
 
-#: A number, or a clause that states why there is no number.
-Reading = float | str
+
+@dataclass(frozen=True)
+class Bounds:
+    """A worst case that is known from two sides."""
+
+    found: float
+    """Value of the worst case that was found."""
+    proven: float
+    """Value that no case passes."""
+
+
+#: A number, a number from two sides, or a clause that states why there is no number.
+Reading = float | Bounds | str
 
 Data = TypeVar("Data")
+
+#: Text of the verdict ``undecided``.
+_UNDECIDED = (
+    "no case was found that does not meet the threshold, but it is not proven that "
+    "there is none"
+)
 
 
 @dataclass(frozen=True)
@@ -64,19 +81,29 @@ class Criterion(Generic[Data]):
         value = self.read(data)
         if isinstance(value, str):
             return self.without_number(value)
+        proven = None
+        if isinstance(value, Bounds):
+            proven, value = value.proven, value.found
         if math.isnan(value):
             return self.without_number("there is no such number")
         met = self.met_by(value)
-        verdict: Judgement = "pass" if met else "fail"
-        text = self.good if met else self.bad
-        return self._verdict(float(value), verdict, text, self.where(data))
+        where = self.where(data)
+        if met and proven is not None and not self.met_by(proven):
+            return self._verdict(value, "undecided", _UNDECIDED, where, proven)
+        word, text = ("pass", self.good) if met else ("fail", self.bad)
+        return self._verdict(float(value), cast("Judgement", word), text, where, proven)
 
     def without_number(self, reason: str) -> Verdict:
         """Returns the verdict ``not applicable``; ``reason`` is its text, a clause."""
         return self._verdict(None, "not applicable", reason)
 
     def _verdict(
-        self, value: float | None, verdict: Judgement, text: str, where: str = ""
+        self,
+        value: float | None,
+        verdict: Judgement,
+        text: str,
+        where: str = "",
+        proven: float | None = None,
     ) -> Verdict:
         return Verdict(
             name=self.name,
@@ -87,6 +114,7 @@ class Criterion(Generic[Data]):
             verdict=verdict,
             text=text,
             source=self.source,
+            proven=proven,
         )
 
 
@@ -106,6 +134,9 @@ class Verdict:
     """Clause that states what follows, or why there is no number."""
     source: str
     """Where the threshold comes from."""
+    proven: float | None = None
+    """Value that no case passes, if ``value`` is the worst case found and a bound is
+    known."""
 
 
 @dataclass(frozen=True)
@@ -116,17 +147,12 @@ class VerdictRow:
     unit: str
     threshold: str
     values: dict[str, float | None]
+    proven: dict[str, float | None]
+    """Values that no case passes, see ``Verdict``."""
     verdicts: dict[str, Judgement]
     text: str
     """Texts of the verdicts. Laws with the same text share one sentence. With a single
     law, the text also states where the number is from."""
-
-
-def shown_value(value: float | None, unit: str) -> float | str | None:
-    """Returns the value that a table shows: "yes" or "no" for a yes-or-no number."""
-    if value is None or unit != YES_OR_NO:
-        return value
-    return "yes" if value else "no"
 
 
 def compare_verdicts(by_law: Mapping[str, Sequence[Verdict]]) -> tuple[VerdictRow, ...]:
@@ -148,6 +174,7 @@ def compare_verdicts(by_law: Mapping[str, Sequence[Verdict]]) -> tuple[VerdictRo
                 first.unit,
                 first.threshold,
                 {law: verdict.value for law, verdict in found.items()},
+                {law: verdict.proven for law, verdict in found.items()},
                 {law: verdict.verdict for law, verdict in found.items()},
                 _together(found),
             )

@@ -52,6 +52,7 @@ COLORS_CSS = (_HERE / "page_colors.css").read_text("utf-8")
 _COLORS = {
     "pass": "pass",
     "fail": "fail",
+    "undecided": "none",
     "not applicable": "none",
     "not computed": "none",
 }
@@ -150,7 +151,7 @@ def _cell_text(cell: Cell, digits: int) -> str:
         verdict = {"not applicable": "n/a"}.get(cell.verdict, cell.verdict)
         return f"{_cell_text(cell.value, digits)}  {verdict:>4}"
     if isinstance(cell, str):
-        return cell
+        return cell.replace("\u2212", "-")
     return number(cell, digits).replace("\u2212", "-")
 
 

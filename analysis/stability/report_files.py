@@ -13,7 +13,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from analysis.loops.model_export import write_models
-from analysis.report.criterion import Verdict, compare_verdicts, shown_value
+from analysis.report.criterion import YES_OR_NO, Verdict, compare_verdicts
 from analysis.report.plain_values import plain
 from analysis.report.provenance import SCHEMA_VERSION, versions
 from analysis.report.render import html, page, text
@@ -137,7 +137,10 @@ def verdict_table(analyses: Sequence[LawAnalysis]) -> Table:
             row.name,
             row.threshold,
             *(
-                Judged(shown_value(row.values[law], row.unit), row.verdicts[law])
+                Judged(
+                    _shown_value(row.values[law], row.unit, row.proven[law]),
+                    row.verdicts[law],
+                )
                 for law in laws
             ),
             row.text,
@@ -164,6 +167,17 @@ def _narrow(table: Table) -> Iterator[Content]:
     if failed:
         yield "Why criteria fail:"
         yield Bullets(failed)
+
+
+def _shown_value(
+    value: float | None, unit: str, proven: float | None
+) -> float | str | None:
+    """Returns what a table shows: a number, its bounds, "yes" or "no"."""
+    if value is not None and proven is not None:
+        return f"{number(value)} to {number(proven)}"
+    if value is None or unit != YES_OR_NO:
+        return value
+    return "yes" if value else "no"
 
 
 def _summary(analyses: Sequence[LawAnalysis], *, narrow: bool = False) -> Section:
@@ -233,7 +247,7 @@ def _verdicts(verdicts: Sequence[Verdict]) -> Section:
         verdicts,
         {
             "criterion": "name",
-            "value": lambda verdict: shown_value(verdict.value, verdict.unit),
+            "value": lambda v: _shown_value(v.value, v.unit, v.proven),
             "where": "where",
             "threshold": "threshold",
             "verdict": "verdict",

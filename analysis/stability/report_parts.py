@@ -10,7 +10,12 @@ from analysis.stability.certificate_parts import CERTIFIED_STARTS, ENERGY_BALANC
 from analysis.stability.law_analysis import Part
 from analysis.stability.linear_parts import LINEAR_MODELS, OPERATING_POINTS, STEP
 from analysis.stability.margin_parts import HEADING_LOOP, MARGINS, RECOMMENDED_GAINS
-from analysis.stability.robustness_parts import CONTACT_ROBUSTNESS, ROBUSTNESS
+from analysis.stability.robustness_parts import (
+    CONTACT_ROBUSTNESS,
+    HEADING_ROBUSTNESS,
+    ROBUSTNESS,
+    ROUTE_ROBUSTNESS,
+)
 from analysis.stability.route_parts import (
     ADAPTATION,
     FROZEN_GAINS,
@@ -44,12 +49,13 @@ SOUND_PARTS: tuple[Part[Any], ...] = (
 #: Parts for a robot on a route.
 ROUTE_PARTS: tuple[Part[Any], ...] = (
     FROZEN_GAINS,
+    ROUTE_ROBUSTNESS,
     GAIN_BOUNDS,
     ADAPTATION,
     ROBOT_CHAIN,
 )
 #: Parts for a robot that searches step by step.
-SEARCH_PARTS: tuple[Part[Any], ...] = (HEADING_LOOP,)
+SEARCH_PARTS: tuple[Part[Any], ...] = (HEADING_LOOP, HEADING_ROBUSTNESS)
 
 _NOT_FOR_ROUTES = (
     "The following parts do not apply, because they are about a robot that follows a "

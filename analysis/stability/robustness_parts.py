@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
+from analysis.loops.heading_families import (
+    heading_families,
+    heading_poles,
+    heading_uncertainty,
+)
 from analysis.loops.linear_plots import plot_pole_cloud, plot_sensitivities
+from analysis.loops.loop_bound import LoopBound, bound_loop
+from analysis.loops.motion_families import (
+    BoxFamilies,
+    contact_families,
+    following_families,
+)
 from analysis.loops.robustness import (
     PoleCloud,
     PoleFunction,
@@ -18,15 +30,24 @@ from analysis.loops.robustness import (
     pole_cloud,
     pole_sensitivities,
 )
-from analysis.report.criterion import Criterion
+from analysis.report.criterion import Bounds, Criterion, Reading
 from analysis.report.plain_values import pick
-from analysis.report.section import Column, Content, Figure, Table
+from analysis.report.section import Column, Content, Figure, Table, number
+from analysis.routes.route_families import (
+    nominal_difference,
+    route_families,
+    route_poles,
+    route_uncertainty,
+)
 from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
+from systems.framework.input_error import InputError
 
 #: Number of random points in the parameter box, in a short and in a full report. The
 #: analysis of contact takes four times as many.
 _SAMPLES = (25, 200)
+#: Difference of growth rates that counts as rounding, 1/s.
+_ROUNDING_PER_S = 1e-10
 
 
 @dataclass(frozen=True)
@@ -35,37 +56,56 @@ class LoopRobustness:
 
     cloud: PoleCloud
     sensitivities: tuple[PoleSensitivity, ...]
+    bound: LoopBound | str
+    """Proven bound of the growth rate, or the reason why there is none."""
+
+    @property
+    def growth_per_s(self) -> Reading:
+        """Growth rate in the worst case, 1/s, from both sides if there is a bound."""
+        found = self.cloud.worst_growth_per_s
+        if isinstance(self.bound, str):
+            return found
+        return Bounds(found, self.bound.proven_growth_per_s)
 
 
 def loop_robustness(
     scenario: Scenario,
     poles: PoleFunction,
+    families: BoxFamilies,
     parameters: tuple[UncertainParameter, ...],
     *,
     samples: int,
+    known_error_per_s: float = 0.0,
 ) -> LoopRobustness:
     """Computes how the poles of a sampled loop depend on uncertain parameters.
 
     Each uncertain parameter has an interval. All intervals together form a box.
     ``poles`` is a function from parameter values to the poles of the loop in the z
-    plane. ``samples`` is the number of random points in the box.
+    plane, and ``families`` from a box to the same loops. ``samples`` is the number of
+    random points in the box. ``known_error_per_s`` is that of ``bound_loop``.
     """
-    return LoopRobustness(
-        pole_cloud(
-            poles,
-            parameters,
-            period=scenario.tick_s,
-            samples=samples,
-            seed=scenario.seed,
-        ),
-        pole_sensitivities(poles, parameters, period=scenario.tick_s),
+    cloud = pole_cloud(
+        poles,
+        parameters,
+        period=scenario.tick_s,
+        samples=samples,
+        seed=scenario.seed,
     )
+    bound: LoopBound | str
+    try:
+        bound = bound_loop(families, cloud, known_error_per_s)
+    except InputError as error:
+        bound = str(error)
+    sensitivities = pole_sensitivities(poles, parameters, period=scenario.tick_s)
+    return LoopRobustness(cloud, sensitivities, bound)
 
 
 def _following(study: Study) -> LoopRobustness:
+    at = study.need("equilibria").at
     return loop_robustness(
         study.scenario,
-        following_poles(study.need("equilibria").at),
+        following_poles(at),
+        following_families(at),
         following_uncertainty(study.scenario),
         samples=_SAMPLES[study.full],
     )
@@ -75,7 +115,31 @@ def _before_an_obstacle(study: Study) -> LoopRobustness:
     return loop_robustness(
         study.scenario,
         contact_poles(study.scenario),
+        contact_families(study.scenario),
         contact_uncertainty(study.scenario),
+        samples=4 * _SAMPLES[study.full],
+    )
+
+
+def _on_a_route(study: Study) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        route_poles(scenario),
+        route_families(scenario),
+        route_uncertainty(scenario),
+        samples=4 * _SAMPLES[study.full],
+        known_error_per_s=nominal_difference(scenario, study.need("frozen_gains")),
+    )
+
+
+def _of_the_heading(study: Study) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        heading_poles(scenario),
+        heading_families(scenario),
+        heading_uncertainty(scenario),
         samples=4 * _SAMPLES[study.full],
     )
 
@@ -88,10 +152,43 @@ def _document(data: LoopRobustness) -> dict[str, Any]:
             "worst_radius", "worst_damping_ratio", "worst_values", "worst_poles",
         ),
         "samples": len(data.cloud.values),
+        "bound": {"problem": data.bound} if isinstance(data.bound, str) else data.bound,
         "sensitivities": [
             vars(row) | {"parameter": row.parameter.name} for row in data.sensitivities
         ],
     }  # fmt: skip
+
+
+def bound_text(bound: LoopBound | str, found_per_s: float) -> str:
+    """Describes a proven bound; ``found_per_s`` is the growth rate found, 1/s."""
+    if isinstance(bound, str):
+        return f"No upper bound: {bound}."
+    proven = bound.proven_growth_per_s
+    if math.isinf(proven):
+        return "No upper bound: the proof needs too many parts of the ranges."
+    gap = (proven - found_per_s) / abs(found_per_s) if found_per_s else math.inf
+    scale = f"All loops are proven stable in {number(bound.scale_proven)} times the "
+    if math.isinf(bound.scale_unstable):
+        scale += f"ranges, and the search ends at {number(bound.scale_largest)} times."
+    else:
+        scale += (
+            "ranges about the nominal values, and an unstable loop was found in "
+            f"{number(bound.scale_unstable)} times the ranges."
+        )
+    reduced = ""
+    if bound.model_error_per_s > _ROUNDING_PER_S:
+        reduced = (
+            " It is about a reduced loop. Where both were compared, the growth rates "
+            f"differ by at most {number(bound.model_error_per_s, 2)} 1/s, and the "
+            "bound allows for ten times this difference."
+        )
+    return (
+        f"It is proven that no values in the ranges have a growth rate above "
+        f"{number(proven, 5)} 1/s. The worst case found has {number(found_per_s, 5)} "
+        f"1/s, so that the gap is {number(100.0 * gap, 2)} %. {scale} The proof is "
+        f"by zero exclusion with Bernstein coefficients, with {bound.parts} parts in "
+        f"{number(bound.computing_time_s, 2)} s.{reduced}"
+    )
 
 
 def _show(data: LoopRobustness) -> list[Content]:
@@ -107,6 +204,7 @@ def _show(data: LoopRobustness) -> list[Content]:
             f"{abs(rate):.3g} 1/s and its damping ratio is "
             f"{cloud.worst_damping_ratio:.3f} (nominal {nominal:.3f})."
         ),
+        bound_text(data.bound, rate),
         Table.of(
             cloud.parameters,
             {
@@ -153,7 +251,7 @@ ROBUSTNESS = Part[LoopRobustness](
             "it stays stable for all parameters in their ranges",
             "some parameters in their ranges make it unstable",
             "stability over the ranges of all parameters",
-            lambda data: data.cloud.worst_growth_per_s,
+            lambda data: data.growth_per_s,
         ),
     ),
     document=_document,
@@ -170,7 +268,41 @@ CONTACT_ROBUSTNESS = Part[LoopRobustness](
             "it comes to rest before an obstacle for all parameters in their ranges",
             "some parameters in their ranges make it swing where the law is stiffest",
             "stability over the ranges of all parameters",
-            lambda data: data.cloud.worst_growth_per_s,
+            lambda data: data.growth_per_s,
+        ),
+    ),
+    document=_document,
+)  # fmt: skip
+
+ROUTE_ROBUSTNESS = Part[LoopRobustness](
+    "route_robustness",
+    "Robustness on the route and before a wall",
+    _on_a_route,
+    _show,
+    criteria=(
+        Criterion(
+            "growth with frozen gains, worst parameters", "1/s", "below", 0.0,
+            "small deviations die out for all parameters in their ranges",
+            "small deviations grow for some parameters in their ranges",
+            "stability over the ranges of all parameters",
+            lambda data: data.growth_per_s,
+        ),
+    ),
+    document=_document,
+)  # fmt: skip
+
+HEADING_ROBUSTNESS = Part[LoopRobustness](
+    "heading_robustness",
+    "Robustness of the heading",
+    _of_the_heading,
+    _show,
+    criteria=(
+        Criterion(
+            "growth of the heading, worst parameters", "1/s", "below", 0.0,
+            "it turns to its heading for all parameters in their ranges",
+            "some parameters in their ranges make it swing about its heading",
+            "stability over the ranges of all parameters",
+            lambda data: data.growth_per_s,
         ),
     ),
     document=_document,

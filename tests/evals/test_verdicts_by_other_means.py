@@ -384,7 +384,8 @@ def test_worst_cases_are_those_of_all_corners(studies, contact):
                 values=(values["robot.mass_kg"], values["attraction.damping_n_s_m"]),
             )
         )
-    worst = read("growth at rest, worst parameters", LoopRobustness(cloud, ()))
+    without_bound = LoopRobustness(cloud, (), "a test")
+    worst = read("growth at rest, worst parameters", without_bound)
     assert worst == pytest.approx(max(found), abs=3e-3)
 
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from analysis.report.criterion import Criterion, Reading, compare_verdicts
+from analysis.report.criterion import Bounds, Criterion, Reading, compare_verdicts
 
 
 def as_it_is(value: Reading) -> Reading:
@@ -45,6 +45,23 @@ def test_verdicts_say_what_follows():
         assert missing.text == "there is no loop"
     assert MARGIN.judge(math.nan).text == "there is no such number"
     assert MARGIN.threshold == "\u2265 45 deg"
+
+
+@pytest.mark.parametrize(
+    ("found", "proven", "verdict"),
+    [
+        (60.0, 50.0, "pass"),
+        (60.0, 40.0, "undecided"),
+        (60.0, -math.inf, "undecided"),
+        (40.0, 30.0, "fail"),
+    ],
+)
+def test_a_threshold_between_the_bounds_is_undecided(found, proven, verdict):
+    judged = MARGIN.judge(Bounds(found, proven))
+    assert (judged.value, judged.proven, judged.verdict) == (found, proven, verdict)
+    assert ("not proven" in judged.text) == (verdict == "undecided")
+    (row,) = compare_verdicts({"a": [judged]})
+    assert row.proven == {"a": proven}
 
 
 def test_laws_of_one_verdict_stand_together():

@@ -91,7 +91,8 @@ def sampled(*delays_s):
 
 
 def uncertain(growth_per_s):
-    return LoopRobustness(Made(worst_growth_per_s=growth_per_s), ())
+    cloud, bound = Made(worst_growth_per_s=growth_per_s), "a test"
+    return LoopRobustness(cloud, (), bound)
 
 
 def certified(start, collisions=3):

@@ -67,6 +67,10 @@ def test_verdicts_are_of_the_numbers(analyses):
     )
     assert adaptive["growth with frozen gains"].verdict == "pass"
     assert adaptive["contacts that may act at once"].value == 18.0
+    for found in (adaptive, filtered):
+        worst = found["growth with frozen gains, worst parameters"]
+        assert worst.verdict == "pass"
+        assert found["growth with frozen gains"].value < worst.value < worst.proven < 0
     assert (
         adaptive["stiffness learned in a jam, share of the stable limit"].verdict
         == "fail"
@@ -90,8 +94,9 @@ def test_verdicts_are_of_the_numbers(analyses):
 
 def test_page_shows_a_law_and_the_table_both(analyses):
     page = stability_page(analyses[1:])
-    # Poles, bounds, responses and gaps; none of adaptation.
-    assert page.count("<figure>") == 4
+    # Poles, uncertain poles, their sensitivities, bounds, responses and gaps; none of
+    # adaptation.
+    assert page.count("<figure>") == 6
     for text in (
         "Robots that follow one another",
         "Parts that do not apply",
