@@ -22,7 +22,7 @@ def test_runs_by_chance_are_those_that_can_be_repeated(capsys):
     assert phonotaxis.main(words) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["runs"], document["collisions"], document["seed"]) == (3, 0, 7)
-    nearest = document["nearest"]["body"]
+    nearest = document["nearest"]
     outcome = run_trial(draw_trial(7, nearest["number"]))
     assert outcome.clearance_m == pytest.approx(nearest["clearance_m"], abs=1e-9)
     assert (

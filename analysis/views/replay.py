@@ -28,8 +28,26 @@ from analysis.runs.known_space import known_space
 from analysis.views.curves import page_charts
 from analysis.views.floor_layers import clipped, floor_layers
 from analysis.views.framing import floor_rectangle, shown_rectangle
-from analysis.views.meshes import Mesh, arrow, circle, prism, rectangles, ribbon, star
-from analysis.views.overlays import Arrow, Ball, Bar, Circle, Disc, Frame, overlays
+from analysis.views.meshes import (
+    Mesh,
+    arrow,
+    circle,
+    frame,
+    prism,
+    rectangles,
+    ribbon,
+    star,
+)
+from analysis.views.overlays import (
+    Arrow,
+    Ball,
+    Bar,
+    Circle,
+    Disc,
+    Frame,
+    Outline,
+    overlays,
+)
 from analysis.views.plume_history import plume_history
 from analysis.views.replay_page import replay_page
 from analysis.views.replay_stage import add_floor, set_stage
@@ -556,6 +574,7 @@ _SINGLE: dict[type, Callable[[Any], Any]] = {
     Estimate: lambda _: Sphere(0.06),
     Ball: lambda shape: Sphere(shape.radius),
     Circle: lambda shape: circle(shape.radius, 0.012, 0.03),
+    Outline: lambda shape: frame(*shape, 0.012, 0.03),
     Arrow: lambda _: arrow(),
     Disc: lambda shape: Cylinder(shape.radius, 0.002),
     Contact: lambda _: star(0.16, BODY_HEIGHT_M + 0.05, 0.035),

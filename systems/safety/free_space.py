@@ -10,6 +10,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
+from systems.safety.outline import Outline, frame_at, in_body
 from systems.safety.views import Sectors, lasting
 
 register_jitable(lasting)
@@ -194,6 +195,60 @@ def clear_disc(
 
 
 @njit(cache=True)
+def clear_outline(
+    space: FreeSpace, pose: Any, outline: Outline, until: float
+) -> None:  # pragma: no cover  (compiled)
+    """Marks the cells that lie entirely within the outline of the body as free.
+
+    The body occupies these cells, so no obstacle does.
+
+    Args:
+        space: Map of free space. The function changes the map in place.
+        pose: Pose (x, y, theta) of the body, m and rad.
+        outline: Outline of the body.
+        until: The cells count as free until the wheels have rolled this mean distance
+            since the start, m.
+    """
+    cell, cells = space.cell_m, space.free_until.shape[0]
+    frame, radius = frame_at(pose, cell), outline.radius_m
+    low_i, low_j, high_i, high_j = cells_within(
+        space, pose[0] - radius, pose[1] - radius, pose[0] + radius, pose[1] + radius
+    )
+    length = outline.half_length_m - frame.half_cell_m
+    width = outline.half_width_m - frame.half_cell_m
+    for i in range(low_i, high_i + 1):
+        for j in range(low_j, high_j + 1):
+            u, v = in_body((i * cell, j * cell), cell, frame)
+            if abs(u) <= length and abs(v) <= width:
+                at = i % cells, j % cells
+                space.free_until[at] = max(space.free_until[at], until)
+
+
+@njit(cache=True)
+def disc_is_free(
+    space: FreeSpace, x: float, y: float, radius: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Checks whether all cells that a disc meets count as free.
+
+    Args:
+        space: Map of free space.
+        x: Center of the disc, x in the frame of the odometry, m.
+        y: Center of the disc, y in the frame of the odometry, m.
+        radius: Radius of the disc, m.
+    """
+    cell = space.cell_m
+    for i in range(math.floor((x - radius) / cell), math.ceil((x + radius) / cell)):
+        dx = max(i * cell - x, 0.0, x - (i + 1) * cell)
+        for j in range(math.floor((y - radius) / cell), math.ceil((y + radius) / cell)):
+            dy = max(j * cell - y, 0.0, y - (j + 1) * cell)
+            if dx * dx + dy * dy < radius * radius and not cell_is_free(
+                space, i, j, space.rolled_m[0]
+            ):
+                return False
+    return True
+
+
+@njit(cache=True)
 def edge_cells(
     space: FreeSpace, x: float, y: float, reach: float, until: float, out: Any
 ) -> int:  # pragma: no cover  (compiled)
@@ -250,30 +305,6 @@ def _free_cells(
             if at == cells:
                 at = 0
     return free
-
-
-@njit(cache=True)
-def nearest_cell(
-    corners: Any, count: int, cell: float, x: float, y: float
-) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance from a position to the nearest of several cells.
-
-    Args:
-        corners: (m, 2) one corner of each cell: least x and least y, m.
-        count: Number of cells in ``corners``.
-        cell: Side of a cell, m.
-        x: Position, x in the frame of the odometry, m.
-        y: Position, y in the frame of the odometry, m.
-
-    Returns:
-        Distance, m; infinite if there are no cells.
-    """
-    best = np.inf
-    for k in range(count):
-        dx = max(corners[k, 0] - x, 0.0, x - corners[k, 0] - cell)
-        dy = max(corners[k, 1] - y, 0.0, y - corners[k, 1] - cell)
-        best = min(best, dx * dx + dy * dy)
-    return math.sqrt(best)
 
 
 @njit(cache=True)

@@ -11,19 +11,22 @@ from numpy.typing import NDArray
 
 from systems.base.lagged_motion import lagged_motion
 from systems.base.parameters import PlantParameters
-from systems.base.robot import RobotParameters, body_radius
+from systems.base.robot import RobotParameters
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
     FreeSpace,
     clear_disc,
+    clear_outline,
+    disc_is_free,
     end_view,
     make_free_space,
     move_window,
     see,
 )
-from systems.safety.parameters import START_BUBBLE_M, GuardParameters
+from systems.safety.outline import Outline
+from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
 from systems.safety.views import (
     PlaceError,
     Sectors,
@@ -54,8 +57,11 @@ class MapNumbers(NamedTuple):
     """Least rolled distance of a rim in one control period, per commanded speed of the
     faster wheel, m/(rad/s). It is 0 if the angles of the encoders are not rounded.
     """
-    radius: float
-    """Radius of the disc that contains the body, m."""
+    outline: Outline
+    margin_m: float
+    """Distance from the disc around the body within which all cells have to be free,
+    so that the cells of the disc stay free, m.
+    """
     bubble: float
     """Radius of the disc that is assumed to be free at the start, m."""
     tick_s: float
@@ -98,10 +104,13 @@ def map_step(
         )
     for k in range(3):
         was_at[k] = pose[k]
-    # If cells can be forgotten, the disc of the body is cleared again.
-    if error.wheel_error > 0.0 or error.pulse_m > 0.0:
-        until = space.rolled_m[0] + lasting(numbers.radius, error)
-        clear_disc(space, pose[0], pose[1], numbers.radius, until)
+    # The body is where no obstacle is. If the disc around it is free, no obstacle is in
+    # the disc either, and its cells are remembered as if they were seen now.
+    radius = numbers.outline.radius_m
+    until = space.rolled_m[0] + lasting(radius, error)
+    clear_outline(space, pose, numbers.outline, until)
+    if disc_is_free(space, pose[0], pose[1], radius + numbers.margin_m):
+        clear_disc(space, pose[0], pose[1], radius, until)
     # Readings of the sensors that have fired in this tick.
     readings = np.empty((len(ranges), 2))
     for k in range(len(ranges)):
@@ -165,9 +174,9 @@ class FreeSpaceMap(Block):
     count whole pulses, and the travel of each wheel has the relative error
     ``wheel_error``.
 
-    At the start, a disc around the axle with the radius ``START_BUBBLE_M`` counts as
-    free. The disc that contains the body always counts as free, because ``MotionGuard``
-    keeps it free.
+    At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
+    free. The outline of the body always counts as free. While the disc around the axle
+    that contains the outline is free, its cells are not forgotten.
 
     The abstract state contains ``FreeSpace`` and the pose of the last control period.
     The output depends on the state and the present inputs. There is no latency.
@@ -178,9 +187,6 @@ class FreeSpaceMap(Block):
         robot: Body, and position of the control point P.
         plant: Lag of the motors, and pulses of the encoders.
         tick_s: Control period, s.
-
-    Raises:
-        InputError: The robot is too large for the start bubble.
 
     Reference: our own work; docs/guard.md has the theorem that depends on this block.
     """
@@ -205,7 +211,6 @@ class FreeSpaceMap(Block):
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        parameters.check(robot)
         self.set_name("free_space_map")
         axes, places, half_angles = sensors.beams
         place_error = PlaceError.of(parameters, robot, plant)
@@ -228,8 +233,9 @@ class FreeSpaceMap(Block):
             ),
             place_error,
             least_way,
-            body_radius(robot),
-            START_BUBBLE_M,
+            Outline.of(robot),
+            parameters.place_error_m + LEAST_MARGIN_M,
+            parameters.start_bubble_m,
             tick_s,
             sensors.round_ticks(tick_s),
         )

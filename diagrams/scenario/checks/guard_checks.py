@@ -11,7 +11,7 @@ from diagrams.scenario.bodies import Body
 from diagrams.scenario.participants import Follower
 from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
-from systems.safety.parameters import START_BUBBLE_M, GuardParameters
+from systems.safety.parameters import GuardParameters
 from systems.safety.views import (
     PlaceError,
     place_error,
@@ -47,21 +47,17 @@ def check_guard(
             f"is {robot.obstacle_sensing}, but the guard needs ranges; set it to "
             "ultrasonic, or leave guard out",
         )
-    try:
-        guard.check(robot.robot)
-    except InputError as error:
-        raise InputError(f"{prefix}{error.field}", error.message) from None
     _check_view(prefix, robot)
     _check_memory(prefix, robot, guard, tick_s)
     x, y = robot.start.position_m
     for name, body in bodies.items():
         distance = body.distance((x, y), 0.0)
-        if distance < START_BUBBLE_M:
+        if distance < guard.start_bubble_m:
             raise InputError(
                 f"{prefix}start.position_m",
                 f"{name!r} is {distance:.3g} m from the axle, but the guard assumes "
-                f"that a disc of {START_BUBBLE_M:g} m around the axle is free; move "
-                "one of them",
+                f"that a disc of {guard.start_bubble_m:g} m around the axle is free; "
+                "move one of them, or lower guard.start_bubble_m",
             )
 
 

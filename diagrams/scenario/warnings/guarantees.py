@@ -19,7 +19,7 @@ from systems.base.robot import body_radius
 from systems.base.tyre_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError, shortened
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M, START_BUBBLE_M
+from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M
 from systems.safety.views import (
     RANGE_MARGIN_M,
     PlaceError,
@@ -260,11 +260,12 @@ def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
 
 def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
     """Returns assumption A3: no body is within the start bubble."""
-    place = scenario.only.start.position_m
+    place, guard = scenario.only.start.position_m, scenario.follower.own_guard
+    assert guard is not None
     nearest = min((body.distance(place, 0.0) for body in bodies), default=math.inf)
     field, text = "start.position_m", "nearest body at the start"
     return Assumption(
-        "A3", text, nearest, START_BUBBLE_M, "m", at_least=True, field=field
+        "A3", text, nearest, guard.start_bubble_m, "m", at_least=True, field=field
     )
 
 
@@ -335,8 +336,8 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
         ),
         Assumption(
             "A5",
-            "approach to a cell between two looks and while coasting",
-            unseen_approach(robot, plant, tick_s),
+            "approach to a cell while coasting",
+            unseen_approach(robot),
             LEAST_MARGIN_M,
             "m",
             field="robot.top_speed_m_s",

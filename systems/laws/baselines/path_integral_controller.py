@@ -305,7 +305,8 @@ def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-unt
     follow = numbers.follow
     clear = np.array([[target[0], target[1], SOURCE_CLEARANCE_M]])
     start = at[0], at[1]
-    find_way(way, space, start, target, 0.0, numbers.radius_m, clear)
+    widths = numbers.radius_m, numbers.radius_m
+    find_way(way, space, start, target, 0.0, widths, clear)
     straight = math.hypot(target[0] - px, target[1] - py)
     left = straight
     carrot = target

@@ -44,7 +44,7 @@ def echoes(space, x, y, hits):
 
 def seek(way, space, start, goal, time):
     """Echoes within 30 cm of the goal are its own."""
-    find_way(way, space, start, goal, time, RADIUS, np.array([[*goal, 0.3]]))
+    find_way(way, space, start, goal, time, WIDTHS, np.array([[*goal, 0.3]]))
 
 
 def cost_by_scipy(price, start, goal):

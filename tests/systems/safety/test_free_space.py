@@ -16,13 +16,15 @@ from systems.safety.free_space import (
     FreeSpace,
     cell_is_free,
     clear_disc,
+    clear_outline,
+    disc_is_free,
     edge_cells,
     end_view,
     make_free_space,
     move_window,
-    nearest_cell,
     see,
 )
+from systems.safety.outline import Outline
 from systems.safety.views import PlaceError, lasting, place_error, sensor_sectors
 from systems.world.cones import fan_ranges
 
@@ -290,6 +292,36 @@ def test_a_disc_clears_the_cells_that_lie_wholly_in_it():
     assert cell_is_free(space, 10, -7, 2.0), "what was known stays so"
 
 
+def test_a_body_clears_the_cells_that_lie_wholly_in_it():
+    space, pose = make_free_space(100, CELL_M, 1, 2), (0.51, -0.33, 0.4)
+    clear_outline(space, pose, Outline(0.175, 0.41, 0.446), 2.0)
+    c, s = math.cos(0.4), math.sin(0.4)
+    expected = {
+        (i, j)
+        for i in range(-50, 50)
+        for j in range(-50, 50)
+        if all(
+            abs(c * x + s * y) <= 0.175 and abs(c * y - s * x) <= 0.41
+            for x in (i * CELL_M - 0.51, (i + 1) * CELL_M - 0.51)
+            for y in (j * CELL_M + 0.33, (j + 1) * CELL_M + 0.33)
+        )
+    }
+    assert free_cells(space) == expected
+
+
+def test_a_disc_is_free_if_all_cells_that_it_meets_are():
+    space = make_free_space(100, CELL_M, 1, 2)
+    clear_disc(space, 0.0, 0.0, 1.0, 1.0)
+    space.rolled_m[0] = 0.5
+    assert disc_is_free(space, 0.02, -0.01, 0.9)
+    space.free_until[4, 100 - 3] = NEVER  # x from 0.2 m, y up to -0.1 m
+    corner = math.hypot(0.2 - 0.02, 0.1 - 0.01)
+    assert disc_is_free(space, 0.02, -0.01, corner - 1e-6)
+    assert not disc_is_free(space, 0.02, -0.01, corner + 1e-6)
+    space.rolled_m[0] = 1.5
+    assert not disc_is_free(space, 0.02, -0.01, 0.01)
+
+
 def test_the_edge_holds_the_nearest_of_all_cells_that_are_not_free():
     draw = np.random.default_rng(8)
     out, checked = np.empty((4000, 2)), 0
@@ -314,13 +346,10 @@ def test_the_edge_holds_the_nearest_of_all_cells_that_are_not_free():
             checked += 1
             beyond = np.maximum(corners - [x, y], [x, y] - corners - CELL_M)
             expected = np.hypot(*np.maximum(beyond, 0.0).T).min()
-            found = nearest_cell(out, count, CELL_M, x, y)
+            edge = np.maximum(out[:count] - [x, y], [x, y] - out[:count] - CELL_M)
+            found = np.hypot(*np.maximum(edge, 0.0).T).min()
             assert found == pytest.approx(expected, abs=1e-12)
     assert checked > 200
-
-
-def test_without_an_edge_nothing_is_near():
-    assert nearest_cell(np.empty((4, 2)), 0, CELL_M, 0.0, 0.0) == math.inf
 
 
 def test_an_edge_that_is_longer_than_the_list_is_counted_all_the_same():
