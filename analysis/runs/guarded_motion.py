@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from diagrams import RunResult
 from systems.framework.compiling import njit
-from systems.safety.braking import BrakingNumbers, braked, roll_on, rolled_speeds
 from systems.safety.motion_guard import MotionGuard
+from systems.safety.predicted_motion import (
+    BrakingNumbers,
+    braked,
+    roll_on,
+    rolled_speeds,
+)
 from systems.safety.sensing_monitor import SENSING_FAULTS
 
 #: Actions of a guard. The index is the number in the table of a run.

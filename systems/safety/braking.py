@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
-from numpy.typing import NDArray
 
-from systems.base.lagged_motion import LaggedMotion, advance_pose
 from systems.framework.compiling import njit
-from systems.safety.free_space import FreeSpace, cell_is_free, edge_cells
-from systems.safety.outline import Outline, enters, frame_at, gaps, least_between
+from systems.safety.danger import Danger, nearest_view
+from systems.safety.outline import enters, frame_at, gaps, least_between
+from systems.safety.predicted_motion import BrakingNumbers, braked, roll_on
 from systems.safety.views import IN_PLACE_M, REST_M
 
 #: Numbers of the actions of the guard.
@@ -33,156 +31,6 @@ _IN_PLACE_M_S = 1e-6
 _WITHDRAWS = 0.2
 #: Tolerance for a robot that is nearer than ``keep_m`` and may not come nearer, m.
 _SAME_M = 1e-6
-
-
-class BrakingNumbers(NamedTuple):
-    """Model of the robot's motion and braking, and distances that the robot keeps."""
-
-    wheel_radius_m: float
-    wheel_separation_m: float
-    motor_lag_s: float
-    """Time constant of the wheels' speeds, s."""
-    braking_m_s2: float
-    """Deceleration of the commanded speed of the faster rim, m/s^2."""
-    tick_s: float
-    parts: int
-    """Number of parts of a control period. At the end of each part, the guard compares
-    the position of the robot with the cells.
-    """
-    part: LaggedMotion
-    """Motion of the wheels in one part."""
-    top_wheel_speed: float
-    """Top speed of a wheel, rad/s."""
-    outline: Outline
-    keep_m: float
-    """Distance that the outline has to keep from non-free space, m."""
-    least_m: float
-    """Distance below which the outline may not come nearer to a cell, m."""
-    obstacle_speed_m_s: float
-    """Largest speed of obstacles in view, m/s. With 0, all obstacles are at rest."""
-
-
-class Danger(NamedTuple):
-    """Non-free cells and ends of sensor views that the robot has to avoid.
-
-    The view of a sensor is the region in which it has seen free floor. The data are
-    those of one control period.
-    """
-
-    corners: NDArray[np.float64]
-    """(m, 2) corners of non-free cells from ``edge_cells``, m."""
-    corner_count: int
-    """Number of cells in ``corners``."""
-    cell_m: float
-    distance_m: float
-    """Present distance of the lane from the nearest cell in ``corners``, m. It is minus
-    infinity if the axle is in a non-free cell.
-    """
-    arcs: NDArray[np.float64]
-    """(sensors, points, 2) points at which the view of each sensor ends, m."""
-    ages: NDArray[np.float64]
-    """(sensors,) time since the view of each sensor was updated, s."""
-    view_distance_m: float
-    """Present distance of the axle from the nearest end of a view, m."""
-
-
-@register_jitable
-def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, float]:
-    """Computes the wheel speeds at the end of a time with a constant command.
-
-    Args:
-        speeds: Speeds of the left and right wheel at the start, rad/s.
-        commanded: Commanded speeds of the left and right wheel, rad/s.
-        kept: Share of the difference between actual and commanded speed that remains at
-            the end, 0 to 1.
-
-    Returns:
-        Speeds of the left and right wheel at the end, rad/s.
-    """
-    left = commanded[0] + (speeds[0] - commanded[0]) * kept
-    right = commanded[1] + (speeds[1] - commanded[1]) * kept
-    return left, right
-
-
-@njit(cache=True)
-def roll_on(
-    pose: Any, speeds: Any, commanded: Any, numbers: BrakingNumbers
-) -> tuple[Any, Any]:  # pragma: no cover  (compiled)
-    """Computes the pose and the wheel speeds after one part of a control period.
-
-    The wheels roll without slip.
-
-    Args:
-        pose: Pose (x, y, theta) at the start, m and rad.
-        speeds: Speeds of the left and right wheel at the start, rad/s.
-        commanded: Constant commanded speeds of the left and right wheel, rad/s.
-        numbers: Model of the robot.
-
-    Returns:
-        Pose (x, y, theta) at the end, m and rad, and speeds of the left and right wheel
-        at the end, rad/s.
-    """
-    part = numbers.part
-    duration, lagged = part.duration_s, part.lagged_s
-    steady_left, steady_right = commanded[0] * duration, commanded[1] * duration
-    left = steady_left + (speeds[0] - commanded[0]) * lagged
-    right = steady_right + (speeds[1] - commanded[1]) * lagged
-    forward = 0.5 * numbers.wheel_radius_m
-    turning = numbers.wheel_radius_m / numbers.wheel_separation_m
-    moved = advance_pose(
-        pose,
-        (forward * (left + right), turning * (right - left)),
-        (
-            forward * (steady_left + steady_right),
-            turning * (steady_right - steady_left),
-        ),
-        part,
-    )
-    return moved, rolled_speeds(speeds, commanded, part.kept)
-
-
-@njit(cache=True)
-def braked(
-    commanded: Any, numbers: BrakingNumbers
-) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Computes the next command of a robot that brakes without leaving its curve.
-
-    Args:
-        commanded: Present commanded speeds of the left and right wheel, rad/s.
-        numbers: Model of the robot, for the deceleration.
-
-    Returns:
-        Next commanded speeds of the left and right wheel, rad/s.
-    """
-    fastest = max(abs(commanded[0]), abs(commanded[1])) * numbers.wheel_radius_m
-    less = numbers.braking_m_s2 * numbers.tick_s
-    if fastest <= less:
-        return 0.0, 0.0
-    share = 1.0 - less / fastest
-    return commanded[0] * share, commanded[1] * share
-
-
-@njit(cache=True)
-def _nearest_view(
-    danger: Danger, x: float, y: float, ahead_s: float, speed: float
-) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance from a position to the nearest possible obstacle, m.
-
-    The function assumes that an obstacle was at the end of each sensor's view when the
-    sensor took its last reading. From then until ``ahead_s`` from now, the obstacle
-    approaches the position at ``speed``.
-    """
-    nearest = np.inf
-    for sensor in range(danger.arcs.shape[0]):
-        best = np.inf
-        for k in range(danger.arcs.shape[1]):
-            dx, dy = danger.arcs[sensor, k, 0] - x, danger.arcs[sensor, k, 1] - y
-            best = min(best, dx * dx + dy * dy)
-        comes = 0.0
-        if speed > 0.0:
-            comes = speed * (danger.ages[sensor] + ahead_s)
-        nearest = min(nearest, math.sqrt(best) - comes)
-    return nearest
 
 
 @njit(cache=True)
@@ -405,50 +253,10 @@ def _keeps_off_moving(
     x, y = place
     speed = numbers.obstacle_speed_m_s
     keep = numbers.outline.radius_m + numbers.keep_m
-    if _nearest_view(danger, x, y, ahead_s, speed) >= keep:
+    if nearest_view(danger, x, y, ahead_s, speed) >= keep:
         return True
-    withdrawn = _nearest_view(danger, x, y, 0.0, 0.0) - danger.view_distance_m
+    withdrawn = nearest_view(danger, x, y, 0.0, 0.0) - danger.view_distance_m
     return moved > 0.0 and withdrawn >= _WITHDRAWS * moved
-
-
-@njit(cache=True)
-def danger_of(
-    space: FreeSpace, time: float, pose: Any, reach: Any, numbers: BrakingNumbers
-) -> Danger:  # pragma: no cover  (compiled)
-    """Collects the cells and ends of sensor views that the robot has to avoid.
-
-    Args:
-        space: Map of free space.
-        time: Current time, s.
-        pose: Present pose (x, y, theta), m and rad.
-        reach: Two distances, m. The function collects non-free cells within the first
-            distance of the axle. A cell is free only if it will still count as free
-            after the wheels have rolled the second distance.
-        numbers: Model of the robot.
-
-    Returns:
-        Cells and ends of views, as input of ``can_be_braked``.
-    """
-    # The square contains at most this number of cells.
-    corners = np.empty((int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
-    until = space.rolled_m[0] + reach[1]
-    x, y = pose[0], pose[1]
-    count = edge_cells(space, x, y, reach[0], until, corners)
-    distance, frame = np.inf, frame_at(pose, space.cell_m)
-    for k in range(count):
-        now = gaps(corners[k], space.cell_m, frame, numbers.outline)
-        distance = min(distance, max(now[0], now[1]))
-    i, j = math.floor(x / space.cell_m), math.floor(y / space.cell_m)
-    if not cell_is_free(space, i, j, until):
-        distance = -np.inf
-    ages = time - space.arcs_s[:, 0]
-    danger = Danger(corners, count, space.cell_m, distance, space.arcs, ages, np.inf)
-    view_distance = np.inf
-    if numbers.obstacle_speed_m_s > 0.0:
-        view_distance = _nearest_view(danger, x, y, 0.0, 0.0)
-    return Danger(
-        corners, count, space.cell_m, distance, space.arcs, ages, view_distance
-    )
 
 
 @njit(cache=True)

@@ -6,14 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.safety.outline import Outline, frame_at, in_body
-from systems.safety.views import Sectors, lasting
-
-register_jitable(lasting)
 
 #: Value of a cell that was never seen free.
 NEVER = -1.0
@@ -21,12 +17,6 @@ NEVER = -1.0
 _SLACK = 20
 #: In a small window, this limit is the side of the window divided by this number.
 _SLACK_SHARE = 8
-#: A reading updates only one row of cells out of this number of rows. Later readings
-#: update the other rows.
-_ROWS = 4
-#: Echoes within this distance count as a full hit, m. Farther echoes count less,
-#: because their arcs are longer.
-_FULL_HIT_M = 0.6
 
 
 class FreeSpace(NamedTuple):
@@ -51,6 +41,12 @@ class FreeSpace(NamedTuple):
     """(n, n) weighted number of echoes from each cell since the cell was last seen
     free.
     """
+    evidence: NDArray[np.float64]
+    """(n, n) logarithm of the evidence that no surface is in a cell or nearer, at least
+    0. The evidence is a test martingale over the readings since it was last 0.
+    """
+    evident_until: NDArray[np.float64]
+    """(n, n) rolled distance up to which all readings in ``evidence`` are valid, m."""
     first: NDArray[np.int64]
     """(2,) i and j of the first cell of the window."""
     rolled_m: NDArray[np.float64]
@@ -84,6 +80,8 @@ def make_free_space(
         np.full((cells, cells), NEVER),
         np.full((cells, cells), NEVER),
         np.zeros((cells, cells)),
+        np.zeros((cells, cells)),
+        np.full((cells, cells), np.inf),
         np.full(2, -(cells // 2)),
         np.zeros(1),
         np.zeros((sensors, arc_points, 2)),
@@ -164,6 +162,7 @@ def move_window(
                 space.free_until[i, j] = NEVER
                 space.seen_s[i, j] = NEVER
                 space.hits[i, j] = 0.0
+                space.evidence[i, j] = 0.0
         space.first[axis] = wanted
 
 
@@ -305,193 +304,3 @@ def _free_cells(
             if at == cells:
                 at = 0
     return free
-
-
-@njit(cache=True)
-def see(
-    space: FreeSpace,
-    time: float,
-    turn: int,
-    pose: Any,
-    sectors: Sectors,
-    readings: Any,
-    error: Any,
-) -> None:  # pragma: no cover  (compiled)
-    """Enters the newest readings of the sensors into the map of free space.
-
-    Sensors at the same position form a group. For each group, the function visits the
-    cells in its view, up to the greatest distance that the group has seen. For each
-    cell, it combines the readings in all directions that the circle around the cell
-    covers:
-
-    - If the group has seen free floor in all these directions, up to the far side of
-      the circle, the cell becomes free and loses all hits.
-    - Otherwise, the cell gets a hit if an echo comes from the direction of its middle
-      and from about its distance.
-
-    Args:
-        space: Map of free space. The function changes the map in place.
-        time: Current time, s.
-        turn: Number of the call. One call updates only every fourth row of cells. The
-            next call updates other rows.
-        pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
-        sectors: Directions that the sensors see.
-        readings: (sensors, 2) array with two distances per sensor, m. The sensor has
-            seen free floor up to the first distance, which is 0 without a new reading.
-            The second is the distance of the echo, infinite without an echo.
-        error: Errors that limit how long a cell stays free.
-    """
-    cell, cells = space.cell_m, space.free_until.shape[0]
-    # Radius of the circle around a cell.
-    half = cell * math.sqrt(0.5)
-    seen = _of_sectors(sectors, readings)
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    for group in range(len(sectors.places)):
-        begin, end = sectors.first[group], sectors.first[group + 1]
-        ahead, aside = sectors.places[group]
-        # Position of the group in the frame of the odometry.
-        sx, sy = pose[0] + c * ahead - s * aside, pose[1] + s * ahead + c * aside
-        right, left = sectors.right[begin, 0], sectors.left[end - 1, 0]
-        from_axle = math.hypot(ahead, aside)
-        farthest = np.max(seen[begin:end, 2])
-        low_x, low_y, high_x, high_y = _sector_box(
-            sx, sy, pose[2] + right, pose[2] + left, farthest + cell
-        )
-        low_i, low_j, high_i, high_j = cells_within(space, low_x, low_y, high_x, high_y)
-        for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
-            dx = (i + 0.5) * cell - sx
-            for j in range(low_j, high_j + 1):
-                dy = (j + 0.5) * cell - sy
-                squared = dx * dx + dy * dy
-                if squared > (farthest + half) ** 2 or squared < 4.0 * half * half:
-                    continue
-                distance = math.sqrt(squared)
-                # Bearing of the cell from the right edge of the group.
-                bearing = (math.atan2(dy, dx) - pose[2] - right) % math.tau
-                free, echo = _in_direction(
-                    bearing, math.asin(half / distance), sectors, seen, begin, end
-                )
-                at = i % cells, j % cells
-                if free >= distance + half:
-                    until = space.rolled_m[0] + lasting(distance + from_axle, error)
-                    space.free_until[at] = max(space.free_until[at], until)
-                    space.seen_s[at] = time
-                    space.hits[at] = 0.0
-                elif abs(distance - echo) <= half:
-                    space.hits[at] += min(1.0, _FULL_HIT_M / distance)
-
-
-@njit(cache=True)
-def _of_sectors(
-    sectors: Sectors, readings: Any
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Combines the readings of the sensors that see each sector.
-
-    Returns:
-        (sectors, 3) three distances per sector, m: the distance seen free; the distance
-        of the nearest echo, infinite without an echo; and the larger of both, or the
-        distance seen free if there is no echo.
-    """
-    seen = np.empty((len(sectors.right), 3))
-    for k in range(len(seen)):
-        free, echo = 0.0, np.inf
-        for sensor in range(len(readings)):
-            if sectors.seen_by[k, sensor]:
-                free = max(free, readings[sensor, 0])
-                echo = min(echo, readings[sensor, 1])
-        seen[k, 0], seen[k, 1] = free, echo
-        seen[k, 2] = max(free, echo) if echo < np.inf else free
-    return seen
-
-
-@njit(cache=True)
-def _in_direction(
-    bearing: float, hides: float, sectors: Sectors, seen: Any, begin: int, end: int
-) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Returns how far a group of sensors has seen toward a cell.
-
-    ``bearing`` is the angle from the right edge of the group's view to the middle of
-    the cell, rad. The circle around the cell covers ``bearing`` plus and minus
-    ``hides``, rad.
-    The distance seen free is the least distance of all sectors that overlap the circle.
-    It is 0 if a part of the circle is out of view. The echo is that of the sector that
-    contains the middle of the cell.
-
-    Returns:
-        Distance seen free, m, and distance of the echo, m, infinite without an echo.
-    """
-    right = sectors.right[begin, 0]
-    span = sectors.left[end - 1, 0] - right
-    around = span > math.tau - 1e-9
-    low, high = bearing - hides, bearing + hides
-    if not around and (low < 0.0 or high > span):
-        return 0.0, np.inf
-    free, echo = np.inf, np.inf
-    for k in range(begin, end):
-        a, b = sectors.right[k, 0] - right, sectors.left[k, 0] - right
-        # In a full circle, the angle may overlap the sector across the right edge.
-        beyond = around and (a < high - math.tau or b > low + math.tau)
-        if beyond or (a < high and b > low):
-            free = min(free, seen[k, 0])
-            if a <= bearing < b:
-                echo = seen[k, 1]
-    return free, echo
-
-
-@njit(cache=True)
-def end_view(
-    space: FreeSpace,
-    sensor: int,
-    time: float,
-    pose: Any,
-    place: Any,
-    direction: Any,
-    reach: float,
-) -> None:  # pragma: no cover  (compiled)
-    """Stores the arc at which the view of a sensor ends.
-
-    Args:
-        space: Map of free space. The function changes the map in place.
-        sensor: Index of the sensor.
-        time: Current time, s.
-        pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
-        place: Position (x, y) of the sensor relative to the axle, in the axes of the
-            body, m.
-        direction: Direction of the sensor's axis in the axes of the body, and half of
-            the aperture, rad.
-        reach: Distance up to which the sensor has seen free floor, m.
-    """
-    axis, half_angle = direction
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    x, y = pose[0] + c * place[0] - s * place[1], pose[1] + s * place[0] + c * place[1]
-    points = space.arcs.shape[1]
-    for k in range(points):
-        angle = pose[2] + axis + half_angle * (2.0 * k / (points - 1) - 1.0)
-        space.arcs[sensor, k, 0] = x + reach * math.cos(angle)
-        space.arcs[sensor, k, 1] = y + reach * math.sin(angle)
-    space.arcs_s[sensor, 0] = time
-
-
-@njit(cache=True)
-def _sector_box(
-    x: float, y: float, right: float, left: float, reach: float
-) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
-    """Computes the rectangle, parallel to the axes, that encloses a sector of a disc.
-
-    The extremes are at the center, at an end of the arc, or where the arc crosses the
-    direction of a coordinate axis.
-
-    Returns:
-        Least x, least y, greatest x, and greatest y, m.
-    """
-    low_x, low_y, high_x, high_y = x, y, x, y
-    quarter = math.ceil(right / (math.pi / 2.0))
-    angle = right
-    while True:
-        px, py = x + reach * math.cos(angle), y + reach * math.sin(angle)
-        low_x, high_x = min(low_x, px), max(high_x, px)
-        low_y, high_y = min(low_y, py), max(high_y, py)
-        if angle >= left:
-            return low_x, low_y, high_x, high_y
-        angle = min(left, quarter * math.pi / 2.0)
-        quarter += 1

@@ -20,14 +20,14 @@ from systems.safety.free_space import (
     clear_disc,
     clear_outline,
     disc_is_free,
-    end_view,
     make_free_space,
     move_window,
-    see,
 )
 from systems.safety.outline import Outline
 from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
+from systems.safety.seen_cells import end_view, see
 from systems.safety.views import (
+    RANGE_MARGIN_M,
     PlaceError,
     Sectors,
     lasting,
@@ -48,8 +48,9 @@ class MapNumbers(NamedTuple):
     places: NDArray[np.float64]
     """(sensors, 2) position relative to the axle in B, m."""
     limits: NDArray[np.float64]
-    """(sensors, 3) three distances per sensor, m: least range, greatest range, and the
-    largest amount by which a range is too long.
+    """(sensors, 4) four distances per sensor, m: least range, greatest range, the
+    largest amount by which a range is too long, and the standard deviation of the noise
+    of a range.
     """
     error: PlaceError
     """Quantities that determine the position error of a cell due to odometry."""
@@ -112,20 +113,23 @@ def map_step(
     if disc_is_free(space, pose[0], pose[1], radius + numbers.margin_m):
         clear_disc(space, pose[0], pose[1], radius, until)
     # Readings of the sensors that have fired in this tick.
-    readings = np.empty((len(ranges), 2))
+    readings = np.empty((len(ranges), 4))
     for k in range(len(ranges)):
         readings[k, 0], readings[k, 1] = 0.0, np.inf
+        readings[k, 2], readings[k, 3] = -np.inf, 1.0
         if ages[k] > 0.5 * numbers.tick_s:
             continue
-        low, high, margin = numbers.limits[k]
+        low, high, margin, noise_m = numbers.limits[k]
         # For an object nearer than the least range, the sensor reports the least range.
         # In this case, nothing counts as free.
         if echo[k] < 0.5:
-            readings[k, 0] = high - margin
+            readings[k, 0], readings[k, 2] = high - margin, high - RANGE_MARGIN_M
         else:
             readings[k, 1] = ranges[k]
             if ranges[k] > low + margin:
                 readings[k, 0] = ranges[k] - margin
+            readings[k, 2] = ranges[k] - RANGE_MARGIN_M
+        readings[k, 3] = noise_m
         place = numbers.places[k, 0], numbers.places[k, 1]
         direction = numbers.directions[k, 0], numbers.directions[k, 1]
         end_view(space, k, time, pose, place, direction, readings[k, 0])
@@ -167,7 +171,9 @@ class FreeSpaceMap(Block):
 
     The floor around the robot is divided into square cells. The sensors at one position
     see a cell free if the circle around the cell is in their view, and if the whole
-    circle is nearer than their readings minus a margin.
+    circle is nearer than their readings minus a margin. One reading that exceeds the
+    far side of the circle by 5 standard deviations of its noise is enough. Several
+    readings are enough with smaller differences (``free_space.see``).
 
     A cell stays free while the error of its position relative to the robot is at most
     ``place_error_m``. The error grows as the robot drives, for two reasons: encoders
@@ -229,6 +235,7 @@ class FreeSpaceMap(Block):
                     sensors.each("minimum_range_m"),
                     sensors.each("maximum_range_m"),
                     range_errors(sensors),
+                    sensors.each("noise_m"),
                 ]
             ),
             place_error,

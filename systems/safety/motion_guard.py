@@ -21,13 +21,12 @@ from systems.framework.signals import TICK_S
 from systems.safety.braking import (
     HALTED,
     PASSED,
-    BrakingNumbers,
     chosen,
-    danger_of,
-    rolled_speeds,
 )
+from systems.safety.danger import danger_of
 from systems.safety.outline import Outline
 from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M, GuardParameters
+from systems.safety.predicted_motion import BrakingNumbers, rolled_speeds
 from systems.safety.views import stopping_way, tick_parts
 
 #: Sizes of the four parts of the state: velocity of P, wheel speeds, report, and

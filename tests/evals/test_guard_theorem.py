@@ -25,9 +25,9 @@ from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.ultrasonic_array import RangeErrors, measured_ranges, range_errors
-from systems.safety.braking import braked, roll_on
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
+from systems.safety.predicted_motion import braked, roll_on
 from systems.safety.views import PlaceError, lasting
 from systems.world.cones import fan_ranges
 
@@ -96,7 +96,7 @@ def test_a2_noise_stays_below_the_margin_but_for_one_range_in_millions(noise_m):
     """The margin is 2 mm and five standard deviations: 3e-7 by Gauss."""
     sensors = UltrasonicParameters.model_validate({"noise_m": noise_m})
     sensors = sensors.model_copy(update={"sensors": sensors.sensors[:1]})
-    ((_, _, margin),) = FreeSpaceMap(sensors=sensors).step.numbers.limits
+    ((_, _, margin, _),) = FreeSpaceMap(sensors=sensors).step.numbers.limits
     assert margin == pytest.approx(0.002 + 5.0 * noise_m)
     draw = np.random.default_rng(1)
     numbers = draw.standard_normal((2, 300_000))

@@ -19,17 +19,14 @@ from systems.safety.braking import (
     PASSED,
     SLOWED,
     TURNED,
-    BrakingNumbers,
-    Danger,
     _dip,
-    braked,
     can_be_braked,
     chosen,
-    danger_of,
-    roll_on,
 )
+from systems.safety.danger import Danger, danger_of
 from systems.safety.free_space import clear_disc, make_free_space
 from systems.safety.outline import Outline, frame_at, gaps, least_between
+from systems.safety.predicted_motion import BrakingNumbers, braked, roll_on
 from systems.world.geometry import rectangle_clearance
 
 RADIUS = 0.5 * math.hypot(0.35, 0.82)
