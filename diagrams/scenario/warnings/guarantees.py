@@ -340,7 +340,7 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
             unseen_approach(robot),
             LEAST_MARGIN_M,
             "m",
-            field="robot.top_speed_m_s",
+            field="robot.wheel_separation_m",
         ),
         Assumption(
             "A5",
