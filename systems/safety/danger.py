@@ -62,6 +62,35 @@ def nearest_view(
 
 
 @njit(cache=True)
+def _add_cells_at_body(
+    space: FreeSpace,
+    frame: Any,
+    until: float,
+    corners: Any,
+    count: int,
+    numbers: BrakingNumbers,
+) -> int:  # pragma: no cover  (compiled)
+    """Adds the non-free cells that the body covers in part or that are next to it.
+
+    These cells may have no free neighbor, so that ``edge_cells`` does not list them.
+    """
+    cell, reach = space.cell_m, numbers.outline.radius_m + numbers.least_m
+    for i in range(
+        math.floor((frame.x - reach) / cell), math.ceil((frame.x + reach) / cell)
+    ):
+        for j in range(
+            math.floor((frame.y - reach) / cell), math.ceil((frame.y + reach) / cell)
+        ):
+            if cell_is_free(space, i, j, until):
+                continue
+            now = gaps((i * cell, j * cell), cell, frame, numbers.outline)
+            if max(now[0], now[1], now[2]) < numbers.least_m:
+                corners[count, 0], corners[count, 1] = i * cell, j * cell
+                count += 1
+    return count
+
+
+@njit(cache=True)
 def danger_of(
     space: FreeSpace, time: float, pose: Any, reach: Any, numbers: BrakingNumbers
 ) -> Danger:  # pragma: no cover  (compiled)
@@ -79,12 +108,14 @@ def danger_of(
     Returns:
         Cells and ends of views, as input of ``can_be_braked``.
     """
-    # The square contains at most this number of cells.
-    corners = np.empty((int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
+    # The square contains at most this number of cells. Those at the body may count
+    # twice.
+    corners = np.empty((2 * int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
     until = space.rolled_m[0] + reach[1]
     x, y = pose[0], pose[1]
     count = edge_cells(space, x, y, reach[0], until, corners)
     distance, frame = np.inf, frame_at(pose, space.cell_m)
+    count = _add_cells_at_body(space, frame, until, corners, count, numbers)
     for k in range(count):
         now = gaps(corners[k], space.cell_m, frame, numbers.outline)
         distance = min(distance, max(now[0], now[1]))

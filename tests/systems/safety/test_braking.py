@@ -24,7 +24,7 @@ from systems.safety.braking import (
     chosen,
 )
 from systems.safety.danger import Danger, danger_of
-from systems.safety.free_space import clear_disc, make_free_space
+from systems.safety.free_space import clear_disc, clear_outline, make_free_space
 from systems.safety.outline import Outline, frame_at, gaps, least_between
 from systems.safety.predicted_motion import BrakingNumbers, braked, roll_on
 from systems.world.geometry import rectangle_clearance
@@ -321,6 +321,20 @@ def test_beside_cells_on_both_sides_it_drives_on_but_does_not_turn():
         assert done == SLOWED
         assert wheels[0] == wheels[1] == pytest.approx(sum(wish) / 2.0)
     assert chosen(here, rest, (-3.0, 3.0), rest, at_hand, NUMBERS) == (BRAKED, rest)
+
+
+@pytest.mark.parametrize("cell_m", [0.05, 0.25])
+def test_on_unknown_floor_the_body_does_not_turn(cell_m):
+    """Nor does it drive, except over cells that it covers: they are at its own place.
+
+    Cells of 25 cm do not fit into the body, so that none is free, and none is an edge.
+    """
+    here, rest = (0.013, 0.02, 0.4), (0.0, 0.0)
+    space = make_free_space(80, cell_m, 1, 2)
+    clear_outline(space, here, NUMBERS.outline, math.inf)
+    at_hand = danger_of(space, 0.0, here, (1.0, 0.5), NUMBERS)
+    for wish in ((2.0, -2.0), (0.1, -0.1), straight(0.1), straight(-0.1), (1.0, 0.5)):
+        assert not can_be_braked(here, rest, wish, at_hand, NUMBERS)
 
 
 def test_from_where_nothing_is_known_nothing_leads_out():
