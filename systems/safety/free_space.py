@@ -234,6 +234,9 @@ def disc_is_free(
         x: Center of the disc, x in the frame of the odometry, m.
         y: Center of the disc, y in the frame of the odometry, m.
         radius: Radius of the disc, m.
+
+    Returns:
+        True if all these cells count as free.
     """
     cell = space.cell_m
     for i in range(math.floor((x - radius) / cell), math.ceil((x + radius) / cell)):
