@@ -44,7 +44,8 @@ class GuardedController(Block):
     """Plans a route to the target and commands speed and yaw rate along the route.
 
     Every 0.5 s, the block computes the cheapest route through free and unknown space.
-    The route leaves room for the width of the body. It costs more where the smallest
+    The route leaves room for the width of the body if the body is longer than wide, and
+    otherwise for its disc. It costs more where the smallest
     disc around the axle that contains the body at every heading does not fit, because
     the robot cannot turn there. An unknown cell of the map costs a little more than a
     free cell. A cell with echoes costs much more.
@@ -127,12 +128,16 @@ class GuardedController(Block):
         super().__init__()
         self.set_name("guarded_controller")
         margin = guard.place_error_m + CLEARANCE_M
+        # In a passage, a body that is longer than wide is narrower than its disc. For a
+        # wide body, the difference is too small to risk a place where it cannot turn.
+        disc = body_radius(robot)
+        narrow = 0.5 * robot.width_m if robot.length_m > robot.width_m else disc
         numbers = DriveNumbers(
             attraction.follow_distance_m,
             robot.control_point_m,
             hazard_sensors(sensors, robot, tick_s),
             (0.5 * robot.length_m, 0.5 * robot.width_m),
-            (0.5 * robot.width_m + margin, body_radius(robot) + margin),
+            (narrow + margin, disc + margin),
             max(CRUISE_SPEED_M_S, _CRUISE_SHARE * robot.top_speed_m_s),
             tick_s,
         )

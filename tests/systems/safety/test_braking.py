@@ -307,7 +307,8 @@ def test_a_turn_on_the_spot_ends_where_the_outline_meets_a_cell(side):
         pose, speeds = roll_on(pose, speeds, commanded, NUMBERS)
     gap = clear_of(pose, corners)
     assert 0.3 < side * pose[2] < 1.0
-    assert 0.012 - 1e-6 <= gap < 0.012 + 0.011
+    # After the last look, the corner coasts by up to 0.44 mm.
+    assert 0.012 - 0.00044 <= gap < 0.012 + 0.011
     assert wheels > 0.0
 
 
