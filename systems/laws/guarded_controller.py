@@ -45,10 +45,10 @@ class GuardedController(Block):
 
     Every 0.5 s, the block computes the cheapest route through free and unknown space.
     The route leaves room for the width of the body if the body is longer than wide, and
-    otherwise for its disc. It costs more where the smallest
-    disc around the axle that contains the body at every heading does not fit, because
-    the robot cannot turn there. An unknown cell of the map costs a little more than a
-    free cell. A cell with echoes costs much more.
+    otherwise for the smallest disc around the axle that contains the body at every
+    heading. It costs more where this disc does not fit, because the robot cannot turn
+    there. An unknown cell of the map costs a little more than a free cell. A cell with
+    echoes costs much more.
 
     The robot drives straight toward a point of the route. This is the farthest point
     for which the straight line costs little more than the route. The speed depends on
