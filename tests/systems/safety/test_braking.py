@@ -150,10 +150,11 @@ def test_braking_keeps_the_curve():
 def clear_of(pose: Any, corners: Any, length: float = 0.35) -> float:
     """Distance of a body 0.82 m wide from cells, by the geometry of collisions."""
     body = np.array([*pose, length, 0.82, 0.0])
-    return min(
+    distances = (
         rectangle_clearance(body, np.array([x + 0.025, y + 0.025, 0, 0.05, 0.05, 0]))
         for x, y in corners
     )
+    return float(min(distances))
 
 
 def nearest_on_the_way(
