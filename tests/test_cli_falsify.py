@@ -37,7 +37,7 @@ def test_runs_by_chance_are_those_that_can_be_repeated(capsys):
 
 
 def test_a_collision_is_told_and_makes_status_1(capsys, monkeypatch):
-    hit = Found(4, ("posts", "random", "plain"), True, -0.01, -0.02)
+    hit = Found(4, ("posts", "random", "plain"), True, -0.01)
     monkeypatch.setattr(falsification, "falsify", lambda *_, **__: [hit])
     assert phonotaxis.main(["falsify", "--runs", "1"]) == 1
     printed = capsys.readouterr()
@@ -46,7 +46,7 @@ def test_a_collision_is_told_and_makes_status_1(capsys, monkeypatch):
 
 
 def test_a_contact_of_a_long_run_names_its_job(capsys, monkeypatch):
-    run = LongRun("swing", "plain", 60.0, 60.0, -0.001, -0.002, 0.003, None)
+    run = LongRun("swing", "plain", 60.0, 60.0, -0.001, 0.003, None)
     monkeypatch.setattr(job_pool, "run_jobs", lambda *_, **__: iter([[run]]))
     assert phonotaxis.main(["falsify", "--long", "--only", "5"]) == 1
     printed = capsys.readouterr()
@@ -62,7 +62,7 @@ def test_a_journal_keeps_jobs_and_skips_them(capsys, monkeypatch, tmp_path):
     def job(number):
         ran.append(number)
         swing = Swing(0.7, 3.5, 3.0, 0.1) if number else None
-        return [LongRun("swing", "plain", 60.0, math.inf, 0.03, 0.02, 0.001, swing)]
+        return [LongRun("swing", "plain", 60.0, math.inf, 0.03, 0.001, swing)]
 
     monkeypatch.setattr(long_runs, "jobs", lambda _: [partial(job, n) for n in (0, 1)])
     monkeypatch.setattr(

@@ -41,7 +41,7 @@ def circle(radius: float, z: float, width: float) -> Mesh:
     return ribbon(radius * np.column_stack([np.cos(turns), np.sin(turns)]), z, width)
 
 
-def frame(half_length: float, half_width: float, z: float, width: float) -> Mesh:
+def outline_band(half_length: float, half_width: float, z: float, width: float) -> Mesh:
     """Makes a flat rectangular band around the origin, at the height z.
 
     ``half_length`` and ``half_width`` are half of the sides along x and y. All sizes
