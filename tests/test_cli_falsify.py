@@ -22,7 +22,7 @@ def test_runs_by_chance_are_those_that_can_be_repeated(capsys):
     assert phonotaxis.main(words) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["runs"], document["collisions"], document["seed"]) == (3, 0, 7)
-    nearest = document["nearest"]["body"]
+    nearest = document["nearest"]
     outcome = run_trial(draw_trial(7, nearest["number"]))
     assert outcome.clearance_m == pytest.approx(nearest["clearance_m"], abs=1e-9)
     assert (
@@ -37,7 +37,7 @@ def test_runs_by_chance_are_those_that_can_be_repeated(capsys):
 
 
 def test_a_collision_is_told_and_makes_status_1(capsys, monkeypatch):
-    hit = Found(4, ("posts", "random", "plain"), True, -0.01, -0.02)
+    hit = Found(4, ("posts", "random", "plain"), True, -0.01)
     monkeypatch.setattr(falsification, "falsify", lambda *_, **__: [hit])
     assert phonotaxis.main(["falsify", "--runs", "1"]) == 1
     printed = capsys.readouterr()
@@ -46,7 +46,7 @@ def test_a_collision_is_told_and_makes_status_1(capsys, monkeypatch):
 
 
 def test_a_contact_of_a_long_run_names_its_job(capsys, monkeypatch):
-    run = LongRun("swing", "plain", 60.0, 60.0, -0.001, -0.002, 0.003, None)
+    run = LongRun("swing", "plain", 60.0, 60.0, -0.001, 0.003, None)
     monkeypatch.setattr(job_pool, "run_jobs", lambda *_, **__: iter([[run]]))
     assert phonotaxis.main(["falsify", "--long", "--only", "5"]) == 1
     printed = capsys.readouterr()
@@ -62,7 +62,7 @@ def test_a_journal_keeps_jobs_and_skips_them(capsys, monkeypatch, tmp_path):
     def job(number):
         ran.append(number)
         swing = Swing(0.7, 3.5, 3.0, 0.1) if number else None
-        return [LongRun("swing", "plain", 60.0, math.inf, 0.03, 0.02, 0.001, swing)]
+        return [LongRun("swing", "plain", 60.0, math.inf, 0.03, 0.001, swing)]
 
     monkeypatch.setattr(long_runs, "jobs", lambda _: [partial(job, n) for n in (0, 1)])
     monkeypatch.setattr(

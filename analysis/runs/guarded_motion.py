@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from diagrams import RunResult
 from systems.framework.compiling import njit
-from systems.safety.braking import BrakingNumbers, braked, roll_on, rolled_speeds
 from systems.safety.motion_guard import MotionGuard
+from systems.safety.predicted_motion import (
+    BrakingNumbers,
+    braked,
+    roll_on,
+    rolled_speeds,
+)
 from systems.safety.sensing_monitor import SENSING_FAULTS
 
 #: Actions of a guard. The index is the number in the table of a run.
@@ -33,9 +38,9 @@ class GuardedMotion:
     resting_poses: NDArray[np.float64]
     """(n, 3) poses (x, y, theta) at which the robot would come to rest if it braked
     from each tick on. The poses are in the frame of the odometry, m and rad."""
-    keep_m: float
-    """Radius of a disc around the origin of B, m. The guard keeps this disc in free
-    space."""
+    half_size_m: tuple[float, float]
+    """Half of the length and width of a rectangle around the origin of B, m: the
+    outline of the body plus the margin. The guard keeps it in free space."""
 
 
 def guarded_motion(result: RunResult) -> GuardedMotion | None:
@@ -53,6 +58,7 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
         tick_s=scenario.tick_s,
     )
     braking = guard.step.numbers.braking
+    outline, keep_m = braking.outline, braking.keep_m
     names = "p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"
     poses = np.column_stack([columns[name] for name in names])
     sides = "wheel_speed_left", "wheel_speed_right"
@@ -61,7 +67,7 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
     return GuardedMotion(
         np.rint(columns["guard_action"]).astype(np.int64),
         _resting_poses(poses, commands, braking),
-        braking.keep_m,
+        (outline.half_length_m + keep_m, outline.half_width_m + keep_m),
     )
 
 

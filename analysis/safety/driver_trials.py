@@ -16,7 +16,6 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from diagrams import RunResult, Scenario, simulate
-from systems.base.robot import body_radius
 from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
@@ -163,8 +162,6 @@ class Outcome(NamedTuple):
     """Whether the robot touched an obstacle."""
     clearance_m: float
     """Least clearance of the body, m."""
-    disc_m: float
-    """Least clearance of the disc about the axle that encloses the body, m."""
 
 
 #: Settings of the robot from which ``draw_trial`` selects, by name. Each setting is a
@@ -453,7 +450,7 @@ def draw_trial(
 def run_trial(trial: Trial, changes: dict[str, Any] | None = None) -> Outcome:
     """Runs a trial and returns its outcome. ``changes`` are those of ``run_result``."""
     result = run_result(trial, changes)
-    return Outcome(result.collision is not None, *least_clearances(result))
+    return Outcome(result.collision is not None, least_clearance(result))
 
 
 def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult:
@@ -463,28 +460,23 @@ def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult
     return simulate(Scenario.model_validate(fields), engine="compiled")
 
 
-def least_clearances(result: RunResult) -> tuple[float, float]:
-    """Computes the least distances from the obstacles during a run, m.
+def least_clearance(result: RunResult) -> float:
+    """Computes the least distance of the body from the obstacles during a run, m.
 
-    The first distance is that of the robot's body. The second is that of the disc about
-    the axle that encloses the body. A negative distance means an overlap. The obstacles
-    must be at rest. The true poses of the robot are evaluated at the control updates
-    and halfway between them.
+    A negative distance means an overlap. The obstacles must be at rest. The true poses
+    of the robot are evaluated at the control updates and halfway between them.
     """
     robot = result.scenario.only.robot
     others = result.surroundings.bodies.values()
     boxes = np.concatenate([body.rectangles(0.0) for body in others])
     size = np.array([robot.length_m, robot.width_m])
     poses = np.ascontiguousarray(result.poses("WB"))
-    body, disc = _least(poses, boxes, size)
-    return float(body), float(disc) - body_radius(robot)
+    return float(_least(poses, boxes, size))
 
 
 @njit(cache=True)
-def _least(
-    poses: Any, boxes: Any, size: Any
-) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    mine, body, disc = np.zeros(6), np.inf, np.inf
+def _least(poses: Any, boxes: Any, size: Any) -> float:  # pragma: no cover  (compiled)
+    mine, body = np.zeros(6), np.inf
     mine[3:5] = size
     for box in boxes:
         reach = 0.5 * math.hypot(box[3], box[4]) + box[5] + 1.0
@@ -496,9 +488,4 @@ def _least(
                 if half == 1 and k > 0:
                     mine[:3] = 0.5 * (poses[k] + poses[k - 1])
                 body = min(body, rectangle_clearance(mine, box))
-                c, s = math.cos(box[2]), math.sin(box[2])
-                dx, dy = mine[0] - box[0], mine[1] - box[1]
-                u = max(abs(c * dx + s * dy) - 0.5 * box[3], 0.0)
-                v = max(abs(c * dy - s * dx) - 0.5 * box[4], 0.0)
-                disc = min(disc, math.hypot(u, v) - box[5])
-    return body, disc
+    return body

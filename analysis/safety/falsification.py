@@ -3,8 +3,8 @@
 Runs last 10 s and use the compiled engine. A driver is a program that commands the
 robot and tries to cause a collision. Random trials draw layouts and drivers from module
 ``driver_trials``. The search is SciPy's differential evolution over the positions of
-posts and the commands of the driver. It minimizes the clearance of the disc about the
-axle that encloses the body. The results are formatted as JSON documents and as text.
+posts and the commands of the driver. It minimizes the clearance of the
+body. The results are formatted as JSON documents and as text.
 """
 
 from __future__ import annotations
@@ -56,8 +56,6 @@ class Found(NamedTuple):
     """Whether the robot touched an obstacle."""
     clearance_m: float
     """Least clearance of the body, m."""
-    disc_m: float
-    """Least clearance of the disc about the axle that encloses the body, m."""
 
 
 def by_chance(
@@ -95,7 +93,7 @@ def by_search(runs: int, seed: int) -> list[Found]:
     """Searches by differential evolution for a run in which the robot nearly collides.
 
     The search takes about ``runs`` runs, and returns the results of all of them. It
-    minimizes the clearance of the disc about the axle that encloses the robot's body.
+    minimizes the clearance of the robot's body.
     """
     bounds = [(-math.pi, math.pi)]
     bounds += [(-math.pi, math.pi), (START_BUBBLE_M + 0.012, 2.5)] * _POSTS
@@ -108,7 +106,7 @@ def by_search(runs: int, seed: int) -> list[Found]:
         found.append(Found(seed, kinds, *run_trial(trial)))
         # If no body was near, the clearance is infinite. The search needs a finite
         # value.
-        return min(found[-1].disc_m, 10.0)
+        return min(found[-1].clearance_m, 10.0)
 
     evolve(clearance, bounds, runs, seed)
     return found
@@ -186,10 +184,7 @@ def falsification_summary(found: Sequence[Found], seed: int) -> dict[str, Any]:
         "seed": seed,
         **_counts(found),
         "groups": groups,
-        "nearest": {
-            "body": min(found, key=lambda each: each.clearance_m)._asdict(),
-            "disc": min(found, key=lambda each: each.disc_m)._asdict(),
-        },
+        "nearest": min(found, key=lambda each: each.clearance_m)._asdict(),
         "collided": [each._asdict() for each in found if each.collided],
     }
 
@@ -201,7 +196,6 @@ def _counts(found: Sequence[Found]) -> dict[str, Any]:
         "collisions": hits,
         "largest_rate": largest_rate(hits, len(found)),
         "clearance_m": min(each.clearance_m for each in found),
-        "disc_m": min(each.disc_m for each in found),
     }
 
 
@@ -212,8 +206,7 @@ def falsification_text(summary: dict[str, Any]) -> str:
         lines.append(f"by {kind}:")
         lines += [_line(name, counts) for name, counts in groups.items()]
     lines.append(_line("all", summary))
-    for what, each in summary["nearest"].items():
-        lines.append(f"least clearance of the {what}: {_run_text(each)}")
+    lines.append(f"least clearance: {_run_text(summary['nearest'])}")
     lines += [f"collision: {_run_text(each)}" for each in summary["collided"]]
     return "\n".join(lines)
 
@@ -221,17 +214,16 @@ def falsification_text(summary: dict[str, Any]) -> str:
 def _line(name: str, counts: dict[str, Any]) -> str:
     return (
         f"{name:<24} {counts['runs']:>7} runs, {counts['collisions']} collisions "
-        f"(below {100.0 * counts['largest_rate']:.2g} %), least {_clearances(counts)}"
+        f"(below {100.0 * counts['largest_rate']:.2g} %), least {_clearance(counts)}"
     )
 
 
 def _run_text(run: dict[str, Any]) -> str:
-    return f"run {run['number']} ({', '.join(run['kinds'])}), {_clearances(run)}"
+    return f"run {run['number']} ({', '.join(run['kinds'])}), {_clearance(run)}"
 
 
-def _clearances(run: dict[str, Any]) -> str:
-    body_mm, disc_mm = 1e3 * run["clearance_m"], 1e3 * run["disc_m"]
-    return f"clearance of the body {body_mm:.1f} mm, of the disc {disc_mm:.1f} mm"
+def _clearance(run: dict[str, Any]) -> str:
+    return f"clearance of the body {1e3 * run['clearance_m']:.1f} mm"
 
 
 def trial_summary(trial: Trial, outcome: Outcome, seed: int) -> dict[str, Any]:
@@ -266,5 +258,5 @@ def trial_text(summary: dict[str, Any]) -> str:
     ]
     kinds = ", ".join(summary[kind] for kind in _KINDS)
     hit = "collision" if summary["collided"] else "no collision"
-    end = f"{hit}, {_clearances(summary)}"
+    end = f"{hit}, {_clearance(summary)}"
     return "\n".join([kinds, f"fields {summary['fields']}", "commands:", *rows, end])

@@ -25,7 +25,7 @@ from analysis.safety.driver_trials import (
     SETTINGS,
     Trial,
     draw_trial,
-    least_clearances,
+    least_clearance,
     run_result,
 )
 from analysis.safety.swinging_drivers import (
@@ -71,8 +71,6 @@ class LongRun(NamedTuple):
     """Time of the contact, s; infinite if there was none."""
     clearance_m: float
     """Least clearance of the body, m."""
-    disc_m: float
-    """Least clearance of the disc about the axle that encloses the body, m."""
     odometry_m: float
     """Largest position error of the odometry at the axle, m."""
     swing: Swing | None
@@ -141,10 +139,10 @@ def long_run(trial: Trial, swing: Swing | None = None) -> LongRun:
 def _judged(
     driver: str, setting: str, swing: Swing | None, result: RunResult
 ) -> LongRun:
-    end_s, clearances = result.simulated_s, least_clearances(result)
+    end_s, clearance_m = result.simulated_s, least_clearance(result)
     contact_s = end_s if result.collision else np.inf
     drift_m = float(odometry_error(result).max())
-    return LongRun(driver, setting, end_s, contact_s, *clearances, drift_m, swing)
+    return LongRun(driver, setting, end_s, contact_s, clearance_m, drift_m, swing)
 
 
 def jobs(seed: int) -> list[Job]:
@@ -187,7 +185,7 @@ def _by_search_for_contact(setting: str, seed: int) -> list[LongRun]:
 
     def note(swing: Swing, result: RunResult) -> float:
         found.append(_judged("swing, searched for contact", setting, swing, result))
-        return found[-1].disc_m
+        return found[-1].clearance_m
 
     search_contact(setting, _CONTACT_RUNS, seed, note)
     return found
@@ -226,7 +224,7 @@ def summary_table(runs: Sequence[LongRun], by: Sequence[str]) -> str:
         for names, group in chain(groups.items(), [(everything, [*runs])])
     ]
     head = ["runs", "simulated h", "contacts", "first contact, s"]
-    head += ["clearance of body, mm", "of disc, mm", "odometry error, mm"]
+    head += ["clearance of body, mm", "odometry error, mm"]
     return markdown_table([*by, *head], rows)
 
 
@@ -239,7 +237,6 @@ def _summed(runs: Sequence[LongRun]) -> list[str]:
         str(hits),
         f"{first:.0f}" if hits else "",
         f"{1e3 * min(run.clearance_m for run in runs):.1f}",
-        f"{1e3 * min(run.disc_m for run in runs):.1f}",
         f"{1e3 * max(run.odometry_m for run in runs):.1f}",
     ]
 

@@ -52,6 +52,20 @@ def circle(radius: float, z: float, width: float) -> Mesh:
     return ribbon(radius * np.column_stack([np.cos(turns), np.sin(turns)]), z, width)
 
 
+def outline_band(half_length: float, half_width: float, z: float, width: float) -> Mesh:
+    """Makes a flat rectangular band around the origin, at the height z.
+
+    ``half_length`` and ``half_width`` are half of the sides along x and y. All sizes
+    are in m.
+    """
+    x, y, half = half_length, half_width, 0.5 * width
+    sides = [(x - half, x + half, -y - half, y + half)]
+    sides += [(-x - half, -x + half, -y - half, y + half)]
+    sides += [(-x + half, x - half, y - half, y + half)]
+    sides += [(-x + half, x - half, -y - half, -y + half)]
+    return rectangles(np.array(sides), z)
+
+
 def star(radius: float, z: float, width: float) -> Mesh:
     """Makes the outline of a star around the origin, at the height z.
 

@@ -1,7 +1,7 @@
 """Makes the things that only the replay of a run shows.
 
-They are forces, commands of the laws, discs of the safety guards, tracks of moving
-bodies, lamps and gains.
+They are forces, commands of the laws, outlines that the safety guards keep free, tracks
+of moving bodies, lamps and gains.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ ARROW_HEIGHT_M = 0.36
 LEAST_EXISTS = 0.3
 #: Radii of the rings around tracked bodies, m.
 TRACKED_M = (0.1, 0.2, 0.4, 0.8)
-#: The edge of the disc that a guard keeps free has one color for each group of actions
+#: The outline that a guard keeps free has one color for each group of actions
 #: of the guard: name, key of the color, and actions.
 _EDGES = (
     ("passed", "passed", (PASSED,)),
@@ -76,6 +76,13 @@ class Circle(NamedTuple):
     """A circle on the floor."""
 
     radius: float
+
+
+class Outline(NamedTuple):
+    """The edge of a rectangle on the floor."""
+
+    half_length: float
+    half_width: float
 
 
 class Bar(NamedTuple):
@@ -203,11 +210,11 @@ def _arrow(
 
 
 def _guards(scene: Scene) -> Iterator[Layer]:
-    """Yields a layer with one disc per guard.
+    """Yields a layer with one rectangle per guard.
 
-    The disc is at the pose at which the robot would come to rest if it braked now. The
-    guard keeps this disc in free space. The color of its edge shows the action of the
-    guard.
+    The rectangle is the outline of the body plus the margin, at the pose at which the
+    robot would come to rest if it braked now. The guard keeps it in free space. Its
+    color shows the action of the guard.
     """
     things = []
     for name, own in scene.result.robots.items():
@@ -215,12 +222,13 @@ def _guards(scene: Scene) -> Iterator[Layer]:
         if motion is None:
             continue
         path, still = f"guard/{scene.bodies[name].path}", np.zeros((1, 3))
-        disc = Thing(path, Frame(), "", own.time, motion.resting_poses)
-        things.append(disc)
-        circle = Thing("", Circle(motion.keep_m), "", own.time, still, parent=disc)
+        rests = Thing(path, Frame(), "", own.time, motion.resting_poses)
+        things.append(rests)
+        outline = Outline(*motion.half_size_m)
+        edge_at_rest = Thing("", outline, "", own.time, still, parent=rests)
         things += [
             replace(
-                circle,
+                edge_at_rest,
                 path=f"{path}/{edge}",
                 color=COLORS[color],
                 seen=np.isin(motion.actions, numbers),

@@ -33,12 +33,22 @@ from analysis.views.meshes import (
     arrow,
     circle,
     joined,
+    outline_band,
     prism,
     rectangles,
     ribbon,
     star,
 )
-from analysis.views.overlays import Arrow, Ball, Bar, Circle, Disc, Frame, overlays
+from analysis.views.overlays import (
+    Arrow,
+    Ball,
+    Bar,
+    Circle,
+    Disc,
+    Frame,
+    Outline,
+    overlays,
+)
 from analysis.views.plume_history import plume_history
 from analysis.views.replay_page import replay_page
 from analysis.views.replay_stage import add_floor, set_stage
@@ -565,6 +575,7 @@ _SINGLE: dict[type, Callable[[Any], Any]] = {
     Estimate: lambda _: Sphere(0.06),
     Ball: lambda shape: Sphere(shape.radius),
     Circle: lambda shape: circle(shape.radius, 0.012, 0.03),
+    Outline: lambda shape: outline_band(*shape, 0.012, 0.03),
     Arrow: lambda _: arrow(),
     Disc: lambda shape: Cylinder(shape.radius, 0.002),
     Contact: lambda _: star(0.16, BODY_HEIGHT_M + 0.05, 0.035),

@@ -10,6 +10,7 @@ from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.laws.parameters import AttractionParameters
+from systems.planning.following import CRUISE_SPEED_M_S
 from systems.planning.guarded_drive import (
     CLEARANCE_M,
     GIVING_UP,
@@ -22,6 +23,9 @@ from systems.planning.looks import HazardSensors
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import GuardParameters
 from systems.safety.views import range_errors
+
+#: Share of the top speed at which a fast robot drives. The rest is left for turns.
+_CRUISE_SHARE = 0.86
 
 
 def guarded_step(
@@ -40,9 +44,11 @@ class GuardedController(Block):
     """Plans a route to the target and commands speed and yaw rate along the route.
 
     Every 0.5 s, the block computes the cheapest route through free and unknown space.
-    The route leaves room for the smallest disc around the axle that contains the body
-    at every heading. An unknown cell of the map costs a little more than a free cell. A
-    cell with echoes costs much more.
+    The route leaves room for the width of the body if the body is longer than wide, and
+    otherwise for the smallest disc around the axle that contains the body at every
+    heading. It costs more where this disc does not fit, because the robot cannot turn
+    there. An unknown cell of the map costs a little more than a free cell. A cell with
+    echoes costs much more.
 
     The robot drives straight toward a point of the route. This is the farthest point
     for which the straight line costs little more than the route. The speed depends on
@@ -121,12 +127,18 @@ class GuardedController(Block):
     ) -> None:
         super().__init__()
         self.set_name("guarded_controller")
+        margin = guard.place_error_m + CLEARANCE_M
+        # In a passage, a body that is longer than wide is narrower than its disc. For a
+        # wide body, the difference is too small to risk a place where it cannot turn.
+        disc = body_radius(robot)
+        narrow = 0.5 * robot.width_m if robot.length_m > robot.width_m else disc
         numbers = DriveNumbers(
             attraction.follow_distance_m,
             robot.control_point_m,
             hazard_sensors(sensors, robot, tick_s),
             (0.5 * robot.length_m, 0.5 * robot.width_m),
-            body_radius(robot) + guard.place_error_m + CLEARANCE_M,
+            (narrow + margin, disc + margin),
+            max(CRUISE_SPEED_M_S, _CRUISE_SHARE * robot.top_speed_m_s),
             tick_s,
         )
         state = make_drive_state(guard.cells, sensors.count)

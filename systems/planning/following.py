@@ -30,18 +30,19 @@ class FollowNumbers(NamedTuple):
 
 
 @register_jitable
-def wanted_speed(left: float, along: float) -> float:
+def wanted_speed(left: float, along: float, cruise: float = CRUISE_SPEED_M_S) -> float:
     """Computes the speed with which the robot should approach the target.
 
     Args:
         left: Distance from the target minus the follow distance, m.
         along: Speed of the target in the direction of travel, m/s.
+        cruise: Largest wanted speed, m/s.
 
     Returns:
         Wanted speed, m/s. At a negative speed, the robot backs off.
     """
     wanted = APPROACH_GAIN * left + SOURCE_SHARE * along
-    return min(max(wanted, -BACK_SPEED_M_S), CRUISE_SPEED_M_S)
+    return min(max(wanted, -BACK_SPEED_M_S), cruise)
 
 
 @register_jitable

@@ -49,13 +49,13 @@ from systems.planning.way import (
     make_way,
     mark_blocked,
 )
-from systems.safety.braking import TURNED
+from systems.safety.braking import BRAKED, TURNED
 from systems.safety.free_space import FreeSpace, edge_cells
 
 #: Modes of the robot, see the docstring of the module.
 WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)
 
-#: Distance that routes keep between the disc around the body and occupied cells, m.
+#: Distance that routes keep between the body and occupied cells, m.
 CLEARANCE_M = 0.02
 #: Echoes within this distance from the target count as echoes of the target, m. The
 #: robot expects no other body there.
@@ -179,8 +179,13 @@ class DriveNumbers(NamedTuple):
     sensors: HazardSensors
     half_size: tuple[float, float]
     """Half of the body's length and width, m."""
-    radius_m: float
-    """Radius of the disc for which routes are planned, m."""
+    widths: tuple[float, float]
+    """Distances that routes keep from occupied cells, m: half of the width of the body
+    plus margins, and the radius of the disc around the body plus the same margins. In
+    narrow passages, only the first distance is kept.
+    """
+    cruise_m_s: float
+    """Largest wanted speed, m/s."""
     tick_s: float
 
 
@@ -271,7 +276,7 @@ def drive_guarded(
     # The robot has stayed in one place for too long. It marks the place in front of it
     # as blocked, backs off, and plans a new route.
     if m.mode[0] == DRIVING and time - m.stays_s[0] > _GIVE_UP_S:
-        ahead, at = pose[2] + error, numbers.radius_m + 0.1
+        ahead, at = pose[2] + error, numbers.widths[1] + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
         mark_blocked(state.way, place, time + _MARK_S)
         m.mode[0], m.backed_s[0], m.planned_s[0] = BACKING, time, -np.inf
@@ -359,7 +364,7 @@ def _find_heading(  # type: ignore[no-untyped-def]
         clear = np.empty((1 + len(hazards.exists), 3))
         clear[0, 0], clear[0, 1], clear[0, 2] = *goal, _SOURCE_CLEARANCE_M
         count = 1 + find_movers(hazards, time, clear[1:])
-        find_way(way, space, (x, y), goal, time, numbers.radius_m, clear[:count])
+        find_way(way, space, (x, y), goal, time, numbers.widths, clear[:count])
         m.planned_s[0] = time
         if way.dearest[0] < OCCUPIED:
             m.passable_s[0] = time
@@ -379,7 +384,7 @@ def _find_heading(  # type: ignore[no-untyped-def]
     bearing = math.atan2(carrot[1] - y, carrot[0] - x)
     # Speed of the target away from the robot.
     along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
-    wanted = wanted_speed(left - follow, along)
+    wanted = wanted_speed(left - follow, along, numbers.cruise_m_s)
     rests = math.hypot(velocity[0], velocity[1]) < _RESTS_M_S
     m.carrot[0], m.carrot[1], m.way_left_m[0] = carrot[0], carrot[1], left
     return wanted, wrapped(bearing - theta), rests and abs(left - follow) < _THERE_M
@@ -403,7 +408,7 @@ def _begin_look(time, pose, ahead, m, space, numbers):  # type: ignore[no-untype
         if time - m.blocked_s[0] <= _PATIENCE_S:
             return
         offset, half = numbers.control_point_m, _LOOK_RAD
-        block = _blocking(space, x, y, pose[2], numbers.radius_m)
+        block = _blocking(space, x, y, pose[2], numbers.widths[1])
         m.block[0], m.block[1] = block
         px, py = x + offset * math.cos(pose[2]), y + offset * math.sin(pose[2])
         ahead = math.atan2(block[1] - py, block[0] - px)
@@ -411,7 +416,7 @@ def _begin_look(time, pose, ahead, m, space, numbers):  # type: ignore[no-untype
     if abs(wrapped(left - pose[2])) > abs(wrapped(right - pose[2])):
         left, right = right, left
     m.headings[0], m.headings[1] = left, right
-    m.looks_done[0], m.mode[0] = 0.0, LOOKING
+    m.looks_done[0], m.mode[0], m.blocked_s[0] = 0.0, LOOKING, time
 
 
 @register_jitable
@@ -426,8 +431,10 @@ def _look(time, pose, report, state):  # type: ignore[no-untyped-def]
     heading = m.headings[0] if m.looks_done[0] < 0.5 else m.headings[1]
     to = wrapped(heading - pose[2])
     m.turn[0] = min(max(_LOOK_GAIN * to, -TURN_RATE_RAD_S), TURN_RATE_RAD_S)
-    if abs(to) < _LOOKED_RAD:
-        m.looks_done[0] += 1.0
+    # In a narrow place, the guard may not let the robot turn so far.
+    held = report[0] >= BRAKED and time - m.blocked_s[0] > _PATIENCE_S
+    if abs(to) < _LOOKED_RAD or held:
+        m.looks_done[0], m.blocked_s[0] = m.looks_done[0] + 1.0, time
     seen = not first and report[1] > _ROOM_M
     if m.looks_done[0] > 1.5 or seen:
         if not first and not seen:

@@ -19,9 +19,10 @@ from systems.safety.free_space import NEVER, FreeSpace
 # ``FREE``: the cell was seen free.
 # ``UNKNOWN``: the cell is unknown.
 # ``NEAR``: the disc is near an occupied cell.
-# ``TIGHT``: the disc is very near an occupied cell.
-# ``DOUBTFUL``: the disc is over a possibly occupied cell.
-# ``OCCUPIED``: the disc is over an occupied cell.
+# ``TIGHT``: the disc is over an occupied cell or very near it, so that the body may
+#   be unable to turn. A body that drives past the cell does not touch it.
+# ``DOUBTFUL``: the sides of the body are over a possibly occupied cell.
+# ``OCCUPIED``: the sides of the body are over an occupied cell.
 FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
 # ``_DOUBTFUL_HITS``: least number of hits of a possibly occupied cell.
 # ``_OCCUPIED_HITS``: least number of hits of an occupied cell.
@@ -111,7 +112,7 @@ def find_way(
     start: Any,
     goal: Any,
     time: float,
-    radius: float,
+    widths: Any,
     clear: Any,
 ) -> None:  # pragma: no cover  (compiled)
     """Finds the cheapest route from the robot to a goal.
@@ -128,7 +129,8 @@ def find_way(
         goal: Position (x, y) of the goal, m. If the goal is outside the window, the
             route leads to the nearest cell of the window.
         time: Current time, s.
-        radius: Radius of the disc that has to pass, m.
+        widths: Half of the width of the body that has to pass, and radius of the disc
+            that contains the body, both with margins, m.
         clear: (n, 3) positions (x, y) and radii, m. Hits within these radii do not
             block the route, because they come from the target or from a moving body.
     """
@@ -136,7 +138,7 @@ def find_way(
     way.cell_m[0] = cell
     for axis in range(2):
         low[axis] = (space.first[axis] + 1) // 2
-    _set_prices(way, space, time, radius, clear)
+    _set_prices(way, space, time, widths, clear)
     si, sj = cell_at(way, start[0], start[1])
     gi, gj = cell_at(way, goal[0], goal[1])
     _search(way, si * size + sj, gi * size + gj)
@@ -188,7 +190,7 @@ def cell_at(
 
 @njit(cache=True)
 def _set_prices(
-    way: Way, space: FreeSpace, time: float, radius: float, clear: Any
+    way: Way, space: FreeSpace, time: float, widths: Any, clear: Any
 ) -> None:  # pragma: no cover  (compiled)
     """Sets the price of each cell from free space, hits, and marks.
 
@@ -213,11 +215,11 @@ def _set_prices(
             x, y = (low[0] + 0.5 * i + 0.25) * cell, (low[1] + 0.5 * j + 0.25) * cell
             if not _is_near(clear, x, y):
                 highest = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
-                _keep_off(way, (x, y), radius, highest)
+                _keep_off(way, (x, y), widths, highest)
     for k in range(len(way.marks)):
         if way.marks[k, 2] > time:
             place = way.marks[k, 0], way.marks[k, 1]
-            _keep_off(way, place, radius, OCCUPIED)
+            _keep_off(way, place, widths, OCCUPIED)
 
 
 @njit(cache=True)
@@ -231,15 +233,16 @@ def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (comp
 
 @njit(cache=True)
 def _keep_off(
-    way: Way, place: Any, radius: float, highest: int
+    way: Way, place: Any, widths: Any, highest: int
 ) -> None:  # pragma: no cover  (compiled)
     """Raises the prices of the wide cells near a narrow cell.
 
-    Within ``radius`` of the narrow cell, the price is ``highest``. Farther away, it is
-    first ``TIGHT`` and then ``NEAR``.
+    Within the first of the ``widths`` of the narrow cell, the price is ``highest``.
+    Farther away, it is first ``TIGHT`` and then ``NEAR``.
     """
     size, cell = way.price.shape[0], way.cell_m[0]
     x, y = place[0] / cell - way.low[0], place[1] / cell - way.low[1]
+    narrow, radius = widths
     reach = (radius + _NEAR_M) / cell
     half = 0.25
     for i in range(max(math.floor(x - reach), 0), min(math.ceil(x + reach), size)):
@@ -247,7 +250,7 @@ def _keep_off(
             dx, dy = max(abs(i + 0.5 - x) - half, 0), max(abs(j + 0.5 - y) - half, 0)
             distance = math.sqrt(dx * dx + dy * dy) * cell
             price = FREE
-            if distance < radius:
+            if distance < narrow:
                 price = highest
             elif distance < radius + _TIGHT_M:
                 price = TIGHT

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
+from systems.safety.outline import Outline, frame_at, in_body
 
 #: Value of a cell that was never seen free.
 NEVER = -1.0
@@ -40,6 +41,12 @@ class FreeSpace(NamedTuple):
     """(n, n) weighted number of echoes from each cell since the cell was last seen
     free.
     """
+    evidence: NDArray[np.float64]
+    """(n, n) logarithm of the evidence that no surface is in a cell or nearer, at least
+    0. The evidence is a test martingale over the readings since it was last 0.
+    """
+    evident_until: NDArray[np.float64]
+    """(n, n) rolled distance up to which all readings in ``evidence`` are valid, m."""
     first: NDArray[np.int64]
     """(2,) i and j of the first cell of the window."""
     rolled_m: NDArray[np.float64]
@@ -73,6 +80,8 @@ def make_free_space(
         np.full((cells, cells), NEVER),
         np.full((cells, cells), NEVER),
         np.zeros((cells, cells)),
+        np.zeros((cells, cells)),
+        np.full((cells, cells), np.inf),
         np.full(2, -(cells // 2)),
         np.zeros(1),
         np.zeros((sensors, arc_points, 2)),
@@ -153,6 +162,7 @@ def move_window(
                 space.free_until[i, j] = NEVER
                 space.seen_s[i, j] = NEVER
                 space.hits[i, j] = 0.0
+                space.evidence[i, j] = 0.0
         space.first[axis] = wanted
 
 
@@ -181,6 +191,63 @@ def clear_disc(
             if dx * dx + dy * dy <= radius * radius:
                 at = i % cells, j % cells
                 space.free_until[at] = max(space.free_until[at], until)
+
+
+@njit(cache=True)
+def clear_outline(
+    space: FreeSpace, pose: Any, outline: Outline, until: float
+) -> None:  # pragma: no cover  (compiled)
+    """Marks the cells that lie entirely within the outline of the body as free.
+
+    The body occupies these cells, so no obstacle does.
+
+    Args:
+        space: Map of free space. The function changes the map in place.
+        pose: Pose (x, y, theta) of the body, m and rad.
+        outline: Outline of the body.
+        until: The cells count as free until the wheels have rolled this mean distance
+            since the start, m.
+    """
+    cell, cells = space.cell_m, space.free_until.shape[0]
+    frame, radius = frame_at(pose, cell), outline.radius_m
+    low_i, low_j, high_i, high_j = cells_within(
+        space, pose[0] - radius, pose[1] - radius, pose[0] + radius, pose[1] + radius
+    )
+    length = outline.half_length_m - frame.half_cell_m
+    width = outline.half_width_m - frame.half_cell_m
+    for i in range(low_i, high_i + 1):
+        for j in range(low_j, high_j + 1):
+            u, v = in_body((i * cell, j * cell), cell, frame)
+            if abs(u) <= length and abs(v) <= width:
+                at = i % cells, j % cells
+                space.free_until[at] = max(space.free_until[at], until)
+
+
+@njit(cache=True)
+def disc_is_free(
+    space: FreeSpace, x: float, y: float, radius: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Checks whether all cells that a disc meets count as free.
+
+    Args:
+        space: Map of free space.
+        x: Center of the disc, x in the frame of the odometry, m.
+        y: Center of the disc, y in the frame of the odometry, m.
+        radius: Radius of the disc, m.
+
+    Returns:
+        True if all these cells count as free.
+    """
+    cell = space.cell_m
+    for i in range(math.floor((x - radius) / cell), math.ceil((x + radius) / cell)):
+        dx = max(i * cell - x, 0.0, x - (i + 1) * cell)
+        for j in range(math.floor((y - radius) / cell), math.ceil((y + radius) / cell)):
+            dy = max(j * cell - y, 0.0, y - (j + 1) * cell)
+            if dx * dx + dy * dy < radius * radius and not cell_is_free(
+                space, i, j, space.rolled_m[0]
+            ):
+                return False
+    return True
 
 
 @njit(cache=True)
@@ -240,27 +307,3 @@ def _free_cells(
             if at == cells:
                 at = 0
     return free
-
-
-@njit(cache=True)
-def nearest_cell(
-    corners: Any, count: int, cell: float, x: float, y: float
-) -> float:  # pragma: no cover  (compiled)
-    """Computes the distance from a position to the nearest of several cells.
-
-    Args:
-        corners: (m, 2) one corner of each cell: least x and least y, m.
-        count: Number of cells in ``corners``.
-        cell: Side of a cell, m.
-        x: Position, x in the frame of the odometry, m.
-        y: Position, y in the frame of the odometry, m.
-
-    Returns:
-        Distance, m; infinite if there are no cells.
-    """
-    best = np.inf
-    for k in range(count):
-        dx = max(corners[k, 0] - x, 0.0, x - corners[k, 0] - cell)
-        dy = max(corners[k, 1] - y, 0.0, y - corners[k, 1] - cell)
-        best = min(best, dx * dx + dy * dy)
-    return math.sqrt(best)

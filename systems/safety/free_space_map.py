@@ -11,19 +11,23 @@ from numpy.typing import NDArray
 
 from systems.base.lagged_motion import lagged_motion
 from systems.base.parameters import PlantParameters
-from systems.base.robot import RobotParameters, body_radius
+from systems.base.robot import RobotParameters
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
     FreeSpace,
     clear_disc,
+    clear_outline,
+    disc_is_free,
     make_free_space,
     move_window,
 )
-from systems.safety.parameters import GuardParameters
-from systems.safety.seeing import end_view, see
+from systems.safety.outline import Outline
+from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
+from systems.safety.seen_cells import end_view, see
 from systems.safety.views import (
+    RANGE_MARGIN_M,
     PlaceError,
     Sectors,
     lasting,
@@ -44,8 +48,9 @@ class MapNumbers(NamedTuple):
     places: NDArray[np.float64]
     """(sensors, 2) position relative to the axle in B, m."""
     limits: NDArray[np.float64]
-    """(sensors, 3) three distances per sensor, m: least range, greatest range, and the
-    largest amount by which a range is too long.
+    """(sensors, 4) four distances per sensor, m: least range, greatest range, the
+    largest amount by which a range is too long, and the standard deviation of the noise
+    of a range.
     """
     error: PlaceError
     """Quantities that determine the position error of a cell due to odometry."""
@@ -53,8 +58,11 @@ class MapNumbers(NamedTuple):
     """Least rolled distance of a rim in one control period, per commanded speed of the
     faster wheel, m/(rad/s). It is 0 if the angles of the encoders are not rounded.
     """
-    radius: float
-    """Radius of the disc that contains the body, m."""
+    outline: Outline
+    margin_m: float
+    """Distance from the disc around the body within which all cells have to be free,
+    so that the cells of the disc stay free, m.
+    """
     bubble: float
     """Radius of the disc that is assumed to be free at the start, m."""
     tick_s: float
@@ -97,25 +105,31 @@ def map_step(
         )
     for k in range(3):
         was_at[k] = pose[k]
-    # If cells can be forgotten, the disc of the body is cleared again.
-    if error.wheel_error > 0.0 or error.pulse_m > 0.0:
-        until = space.rolled_m[0] + lasting(numbers.radius, error)
-        clear_disc(space, pose[0], pose[1], numbers.radius, until)
+    # The body is where no obstacle is. If the disc around it is free, no obstacle is in
+    # the disc either, and its cells are remembered as if they were seen now.
+    radius = numbers.outline.radius_m
+    until = space.rolled_m[0] + lasting(radius, error)
+    clear_outline(space, pose, numbers.outline, until)
+    if disc_is_free(space, pose[0], pose[1], radius + numbers.margin_m):
+        clear_disc(space, pose[0], pose[1], radius, until)
     # Readings of the sensors that have fired in this tick.
-    readings = np.empty((len(ranges), 2))
+    readings = np.empty((len(ranges), 4))
     for k in range(len(ranges)):
         readings[k, 0], readings[k, 1] = 0.0, np.inf
+        readings[k, 2], readings[k, 3] = -np.inf, 1.0
         if ages[k] > 0.5 * numbers.tick_s:
             continue
-        low, high, margin = numbers.limits[k]
+        low, high, margin, noise_m = numbers.limits[k]
         # For an object nearer than the least range, the sensor reports the least range.
         # In this case, nothing counts as free.
         if echo[k] < 0.5:
-            readings[k, 0] = high - margin
+            readings[k, 0], readings[k, 2] = high - margin, high - RANGE_MARGIN_M
         else:
             readings[k, 1] = ranges[k]
             if ranges[k] > low + margin:
                 readings[k, 0] = ranges[k] - margin
+            readings[k, 2] = ranges[k] - RANGE_MARGIN_M
+        readings[k, 3] = noise_m
         place = numbers.places[k, 0], numbers.places[k, 1]
         direction = numbers.directions[k, 0], numbers.directions[k, 1]
         end_view(space, k, time, pose, place, direction, readings[k, 0])
@@ -157,7 +171,9 @@ class FreeSpaceMap(Block):
 
     The floor around the robot is divided into square cells. The sensors at one position
     see a cell free if the circle around the cell is in their view, and if the whole
-    circle is nearer than their readings minus a margin.
+    circle is nearer than their readings minus a margin. One reading that exceeds the
+    far side of the circle by 5 standard deviations of its noise is enough. Several
+    readings are enough with smaller differences (``free_space.see``).
 
     A cell stays free while the error of its position relative to the robot is at most
     ``place_error_m``. The error grows as the robot drives, for two reasons: encoders
@@ -165,8 +181,8 @@ class FreeSpaceMap(Block):
     ``wheel_error``.
 
     At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
-    free. The disc that contains the body always counts as free, because ``MotionGuard``
-    keeps it free.
+    free. The outline of the body always counts as free. While the disc around the axle
+    that contains the outline is free, its cells are not forgotten.
 
     The abstract state contains ``FreeSpace`` and the pose of the last control period.
     The output depends on the state and the present inputs. There is no latency.
@@ -177,9 +193,6 @@ class FreeSpaceMap(Block):
         robot: Body, and position of the control point P.
         plant: Lag of the motors, and pulses of the encoders.
         tick_s: Control period, s.
-
-    Raises:
-        InputError: The robot is too large for the start bubble.
 
     Reference: our own work; docs/guard.md has the theorem that depends on this block.
     """
@@ -204,7 +217,6 @@ class FreeSpaceMap(Block):
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        parameters.check(robot)
         self.set_name("free_space_map")
         axes, places, half_angles = sensors.beams
         place_error = PlaceError.of(parameters, robot, plant)
@@ -223,11 +235,13 @@ class FreeSpaceMap(Block):
                     sensors.each("minimum_range_m"),
                     sensors.each("maximum_range_m"),
                     range_errors(sensors),
+                    sensors.each("noise_m"),
                 ]
             ),
             place_error,
             least_way,
-            body_radius(robot),
+            Outline.of(robot),
+            parameters.place_error_m + LEAST_MARGIN_M,
             parameters.start_bubble_m,
             tick_s,
             sensors.round_ticks(tick_s),

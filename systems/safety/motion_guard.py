@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from systems.base.lagged_motion import lagged_motion
 from systems.base.parameters import PlantParameters
-from systems.base.robot import RobotParameters, body_radius
+from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import (
     COMMANDS,
     WHEEL_SPEED_COLUMNS,
@@ -21,12 +21,12 @@ from systems.framework.signals import TICK_S
 from systems.safety.braking import (
     HALTED,
     PASSED,
-    BrakingNumbers,
     chosen,
-    danger_of,
-    rolled_speeds,
 )
+from systems.safety.danger import danger_of
+from systems.safety.outline import Outline
 from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M, GuardParameters
+from systems.safety.predicted_motion import BrakingNumbers, rolled_speeds
 from systems.safety.views import stopping_way, tick_parts
 
 #: Sizes of the four parts of the state: velocity of P, wheel speeds, report, and
@@ -93,8 +93,9 @@ def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
     fastest = max(abs(wheels[0]), abs(wheels[1])) * robot.wheel_radius_m
     state[0], state[1], state[2], state[3] = v_WP[0], v_WP[1], wheels[0], wheels[1]
     # Without cells nearby, report the distance within which cells were checked.
-    seen = min(danger.distance_m, numbers.reach[0])
-    viewed = min(danger.view_distance_m, numbers.reach[0])
+    checked = numbers.reach[0] - braking.outline.radius_m
+    seen = min(danger.distance_m, checked)
+    viewed = min(danger.view_distance_m - braking.outline.radius_m, checked)
     state[4], state[5] = done, seen - braking.keep_m
     # Stopping distance: the braking distance, and the distance covered during the motor
     # lag and one tick.
@@ -210,8 +211,7 @@ def _numbers(
     velocity: Callable[..., Any],
     tick_s: float,
 ) -> GuardNumbers:
-    radius = body_radius(robot) + own.place_error_m
-    keep = radius + MARGIN_M
+    outline, keep = Outline.of(robot), own.place_error_m + MARGIN_M
     parts = tick_parts(tick_s)
     braking = BrakingNumbers(
         robot.wheel_radius_m,
@@ -222,11 +222,12 @@ def _numbers(
         parts,
         lagged_motion(tick_s / parts, plant.motor_lag_s),
         robot.top_wheel_speed,
+        outline,
         keep,
-        radius + LEAST_MARGIN_M,
+        own.place_error_m + LEAST_MARGIN_M,
         own.obstacle_speed_m_s or 0.0,
     )
     stopping = stopping_way(own, robot, plant, tick_s)
-    reach = keep + stopping + 2.0 * own.cell_m, stopping
+    reach = outline.radius_m + keep + stopping + 2.0 * own.cell_m, stopping
     kept = math.exp(-tick_s / plant.motor_lag_s)
     return GuardNumbers(velocity, robot, braking, kept, reach)

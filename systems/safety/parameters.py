@@ -6,18 +6,15 @@ import math
 
 from pydantic import Field
 
-from systems.base.robot import RobotParameters, body_radius
-from systems.framework.input_error import InputError
 from systems.framework.parameters import (
     Acceleration,
     Fraction,
-    Length,
     NonNegativeLength,
     NonNegativeSpeed,
     Parameters,
 )
 
-#: Distance that the guard keeps between the disc around the body and non-free space, m.
+#: Distance that the guard keeps between the outline of the body and non-free space, m.
 #: The guard keeps this distance in addition to ``place_error_m``.
 MARGIN_M = 0.006
 #: Smaller margin, m, that applies to a robot nearer than ``MARGIN_M``. A robot can come
@@ -25,7 +22,7 @@ MARGIN_M = 0.006
 LEAST_MARGIN_M = 0.003
 #: Side of the square that the map remembers, m. The square moves along with the robot.
 WINDOW_M = 12.8
-#: Default of ``GuardParameters.start_bubble_m``, m.
+#: Default of ``GuardParameters.start_bubble_m``.
 START_BUBBLE_M = 1.0
 
 
@@ -46,30 +43,13 @@ class GuardParameters(Parameters):
     place_error_m: NonNegativeLength = 0.006
     """Largest position error of a cell that counts as free, m. The encoders and
     ``wheel_error`` cause this error. The guard keeps this distance, and 6 mm more,
-    between the disc around the body and non-free space."""
-
-    start_bubble_m: Length = START_BUBBLE_M
-    """Radius of the start bubble, the disc around the axle that counts as free at the
-    start, m. Nothing else may be in this disc at the start."""
+    between the outline of the body and non-free space."""
+    start_bubble_m: float = Field(default=START_BUBBLE_M, ge=0.0, le=WINDOW_M / 2.0)
+    """Radius of the start bubble, m. This disc around the axle counts as free at the
+    start, in addition to the floor under the body. With 0, the robot starts to move
+    only where its sensors have seen free floor next to the body."""
 
     @property
     def cells(self) -> int:
         """Number of cells along a side of the map."""
         return math.ceil(WINDOW_M / self.cell_m - 1e-9)
-
-    def check(self, robot: RobotParameters) -> None:
-        """Checks that the start bubble is large enough for a robot.
-
-        The start bubble is the disc around the axle that the guard assumes to be free
-        at the start. If it is too small, the function raises an ``InputError``.
-        """
-        radius = body_radius(robot)
-        least = radius + 2.0 * self.cell_m
-        if least > self.start_bubble_m:
-            raise InputError(
-                "guard.start_bubble_m",
-                f"is {self.start_bubble_m:g} m, but the body turns within "
-                f"{radius:.3g} m, and two cells of {self.cell_m:g} m do not fit beside "
-                f"it; give at least {math.ceil(1e3 * least) / 1e3:g}, lower "
-                "guard.cell_m, or leave guard out",
-            )

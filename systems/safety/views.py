@@ -217,47 +217,19 @@ def tick_parts(tick_s: float) -> int:
     return math.ceil(tick_s / _PART_S - 1e-9)
 
 
-def unseen_approach(
-    robot: RobotParameters, plant: PlantParameters, tick_s: float
-) -> float:
-    """Computes how much nearer the axle may come to a cell than the guard detects.
+def unseen_approach(robot: RobotParameters) -> float:
+    """Computes how far the outline may move after the guard's last check, m.
 
-    Cells are those of the map of free space. The guard checks the position of the axle
-    at the end of each part of a control period. It makes no further check when the
-    wheel rims will move by less than ``REST_M``. Between two checks and after the last
-    check, four effects may bring the axle nearer to a non-free cell:
-
-    - The axle passes a corner of a cell on a straight path. At two successive checks,
-      the corner is just outside the disc that contains the body. Halfway between these
-      checks, the corner is inside the disc.
-    - The path is curved. Between two checks, it deviates from a straight line by up to
-      a quarter of the line's length times the turn in rad.
-    - The wheels reverse between two checks: the axle goes on and comes back.
-    - The axle coasts after the last check, or during a turn on the spot.
+    The guard makes no further check when the wheel rims will move by less than
+    ``REST_M``. A point of the outline may be farther from the axle than a wheel, and
+    then it moves more than the rims.
 
     Args:
-        robot: Body, wheels, and top speed.
-        plant: Lag of the motors.
-        tick_s: Control period, s.
+        robot: Body and wheels.
 
     Returns:
-        Sum of the four effects, m; 1.6 mm with all defaults. ``LEAST_MARGIN_M`` has to
-        be at least as large.
+        Largest distance, m; 0.44 mm with all defaults. ``LEAST_MARGIN_M`` has to be
+        larger.
     """
-    top, lag, part_s = (
-        robot.top_speed_m_s,
-        plant.motor_lag_s,
-        tick_s / tick_parts(tick_s),
-    )
-    radius, half = body_radius(robot), min(0.5 * top * part_s, body_radius(robot))
-    corner = radius - math.sqrt(radius * radius - half * half)
-    # The path deviates most from its chord if half of the rim's top speed drives the
-    # axle forward, and the other half turns the robot.
-    bow = 0.25 * (0.5 * top * part_s) * (top * part_s / robot.wheel_separation_m)
-    # Speed at the start of the part, if the command reverses to full speed and the axle
-    # is back at its starting point at the end of the part.
-    lagged_s = -lag * math.expm1(-part_s / lag)
-    begin = min(top * (part_s / lagged_s - 1.0), top)
-    turns_s = lag * math.log1p(begin / top)
-    beyond = begin * lag - top * turns_s
-    return corner + bow + beyond + REST_M + IN_PLACE_M
+    lever = 2.0 * body_radius(robot) / robot.wheel_separation_m
+    return REST_M * max(1.0, lever)

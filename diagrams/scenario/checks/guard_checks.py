@@ -47,10 +47,6 @@ def check_guard(
             f"is {robot.obstacle_sensing}, but the guard needs ranges; set it to "
             "ultrasonic, or leave guard out",
         )
-    try:
-        guard.check(robot.robot)
-    except InputError as error:
-        raise InputError(f"{prefix}{error.field}", error.message) from None
     _check_view(prefix, robot)
     _check_memory(prefix, robot, guard, tick_s)
     x, y = robot.start.position_m

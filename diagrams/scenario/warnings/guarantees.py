@@ -260,11 +260,13 @@ def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
 
 def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
     """Returns assumption A3: no body is within the start bubble."""
-    place = scenario.only.start.position_m
+    place, guard = scenario.only.start.position_m, scenario.follower.own_guard
+    assert guard is not None
     nearest = min((body.distance(place, 0.0) for body in bodies), default=math.inf)
     field, text = "start.position_m", "nearest body at the start"
-    bubble = scenario.follower.own_map.start_bubble_m
-    return Assumption("A3", text, nearest, bubble, "m", at_least=True, field=field)
+    return Assumption(
+        "A3", text, nearest, guard.start_bubble_m, "m", at_least=True, field=field
+    )
 
 
 def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
@@ -334,11 +336,11 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
         ),
         Assumption(
             "A5",
-            "approach to a cell between two looks and while coasting",
-            unseen_approach(robot, plant, tick_s),
+            "approach to a cell while coasting",
+            unseen_approach(robot),
             LEAST_MARGIN_M,
             "m",
-            field="robot.top_speed_m_s",
+            field="robot.wheel_separation_m",
         ),
         Assumption(
             "A5",

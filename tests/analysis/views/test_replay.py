@@ -298,7 +298,7 @@ def test_dots_are_where_echoes_came_from(guarded_run, guarded):
     assert ours == {tuple(place) for place in np.round(wanted[inside], 6)}
 
 
-def test_the_guards_disc_is_where_the_robot_could_rest(guarded_run, guarded):
+def test_the_guards_outline_is_where_the_robot_could_rest(guarded_run, guarded):
     motion = guarded_motion(guarded_run)
     assert motion is not None
     for time, X in guarded.transforms["guard/robot"][::16]:
@@ -306,8 +306,8 @@ def test_the_guards_disc_is_where_the_robot_could_rest(guarded_run, guarded):
         if tick < len(motion.actions):
             place = motion.resting_poses[tick, :2]
             np.testing.assert_allclose(X.translation()[:2], place, atol=1e-9)
-    edge = np.hypot(*guarded.meshes["guard/robot/passed"][:2])
-    assert edge.mean() == pytest.approx(motion.keep_m, abs=1e-3)
+    edge = np.abs(guarded.meshes["guard/robot/passed"][:2]).max(axis=1)
+    assert edge - 0.015 == pytest.approx(motion.half_size_m, abs=1e-3)
     for tick in range(0, len(motion.actions), 7):
         seen = [
             name

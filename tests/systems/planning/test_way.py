@@ -25,7 +25,8 @@ from systems.planning.way import (
 )
 from systems.safety.free_space import make_free_space
 
-CELLS, RADIUS = 80, 0.466
+CELLS, NARROW, RADIUS = 80, 0.43, 0.466
+WIDTHS = NARROW, RADIUS
 
 
 def known_space(*, free=True):
@@ -44,7 +45,7 @@ def echoes(space, x, y, hits):
 
 def seek(way, space, start, goal, time):
     """Echoes within 30 cm of the goal are its own."""
-    find_way(way, space, start, goal, time, RADIUS, np.array([[*goal, 0.3]]))
+    find_way(way, space, start, goal, time, WIDTHS, np.array([[*goal, 0.3]]))
 
 
 def cost_by_scipy(price, start, goal):
@@ -99,7 +100,7 @@ def test_prices_go_by_distance_from_the_cell_that_echoed():
             dx = max(0.5 - x, 0.0, x - 0.55)
             dy = max(0.0 - y, 0.0, y - 0.05)
             distance = math.hypot(dx, dy)
-            bands = [(RADIUS, OCCUPIED), (RADIUS + 0.07, TIGHT), (RADIUS + 0.19, NEAR)]
+            bands = [(NARROW, OCCUPIED), (RADIUS + 0.07, TIGHT), (RADIUS + 0.19, NEAR)]
             expected = next((p for limit, p in bands if distance < limit), FREE)
             # The cell itself was not seen free.
             assert way.price[i, j] == expected, (x, y)

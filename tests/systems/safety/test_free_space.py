@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
+from scipy.stats import norm
 
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
@@ -16,12 +17,14 @@ from systems.safety.free_space import (
     FreeSpace,
     cell_is_free,
     clear_disc,
+    clear_outline,
+    disc_is_free,
     edge_cells,
     make_free_space,
     move_window,
-    nearest_cell,
 )
-from systems.safety.seeing import end_view, see
+from systems.safety.outline import Outline
+from systems.safety.seen_cells import end_view, see
 from systems.safety.views import PlaceError, lasting, place_error, sensor_sectors
 from systems.world.cones import fan_ranges
 
@@ -67,13 +70,25 @@ def ranges_of(
     return np.minimum(ranges, sensors.maximum_range_m)
 
 
+def exact(ways: Any) -> NDArray[np.float64]:
+    """Readings without noise: how far is free, and where an echo came from, m."""
+    return np.pad(np.array(ways), ((0, 0), (0, 2)))
+
+
+def noisy(ranges: Any, noise_m: float) -> NDArray[np.float64]:
+    """Readings of echoes with noise, whose only error this is."""
+    ranges = np.asarray(ranges)
+    free, noise = ranges - 5.0 * noise_m, np.full(len(ranges), noise_m)
+    return np.column_stack([free, ranges, ranges, noise])
+
+
 def seen_space(
     sensors: UltrasonicParameters, pose: NDArray[np.float64], boxes: NDArray[np.float64]
 ) -> FreeSpace:
     """What one look of all rows enters."""
     space = make_free_space(160, CELL_M, sensors.count, 17)
     free = ranges_of(sensors, pose, boxes)
-    readings = np.column_stack([free, np.full(sensors.count, np.inf)])
+    readings = exact([[way, np.inf] for way in free])
     sectors = sensor_sectors(sensors, CONTROL_POINT_M)
     for tick in range(4):
         see(space, 0.0, tick, pose, sectors, readings, EXACT)
@@ -213,7 +228,7 @@ def test_beams_with_gaps_see_no_cell_that_lies_in_one():
 def test_every_fourth_row_at_a_tick():
     sensors = sensors_of("the papers' three")
     sectors = sensor_sectors(sensors, CONTROL_POINT_M)
-    readings = np.array([[2.0, np.inf]] * 3)
+    readings = exact([[2.0, np.inf]] * 3)
     pose = np.zeros(3)
     whole = make_free_space(160, CELL_M, 3, 17)
     for tick in range(4):
@@ -230,13 +245,13 @@ def test_an_echo_is_counted_where_it_came_from_until_the_cell_is_seen_free():
     sectors = sensor_sectors(sensors, CONTROL_POINT_M)
     space = make_free_space(160, CELL_M, 3, 17)
     pose = np.zeros(3)
-    readings = np.array([[0.0, np.inf], [1.18, 1.2], [0.0, np.inf]])
+    readings = exact([[0.0, np.inf], [1.18, 1.2], [0.0, np.inf]])
     for tick in range(8):
         see(space, 0.1 * tick, tick, pose, sectors, readings, EXACT)
     i = math.floor((CONTROL_POINT_M + 1.2) / CELL_M)
     assert 0.9 < space.hits[i, 0] <= 2.0
     assert not cell_is_free(space, i, 0, 0.0)
-    readings[1] = 2.0, np.inf
+    readings[1, :2] = 2.0, np.inf
     for tick in range(4):
         see(space, 1.0, tick, pose, sectors, readings, EXACT)
     assert space.hits[i, 0] == 0.0
@@ -261,6 +276,45 @@ def test_the_window_forgets_what_leaves_it_and_keeps_what_stays(x, y):
     assert (space.seen_s == space.free_until).all()
     assert not cell_is_free(space, i - 1, j, 0.0)
     assert not cell_is_free(space, i, j + 64, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "looks"), [(5.01, 1), (4.99, 4), (2.0, 11), (1.0, 31), (0.5, None)]
+)
+def test_several_readings_are_evidence_as_one_of_five_deviations_is(sigmas, looks):
+    """Of k deviations, n readings such that n (k - 1/2) exceeds ln(1/Q(5)) = 15.06."""
+    assert -norm.logsf(5.0) == pytest.approx(15.06, abs=0.01)
+    sensors = sensors_of("the papers' three")
+    sectors, pose = sensor_sectors(sensors, CONTROL_POINT_M), np.zeros(3)
+    space, noise_m = make_free_space(160, CELL_M, 3, 17), 0.005
+    # A cell straight ahead, and the far side of the circle around it.
+    i, half = 23, CELL_M * math.sqrt(0.5)
+    far = math.hypot((i + 0.5) * CELL_M - CONTROL_POINT_M, 0.5 * CELL_M) + half
+    readings, found = noisy([far + sigmas * noise_m] * 3, noise_m), None
+    for look in range(40):
+        if found is None and cell_is_free(space, i, 0, 0.0):
+            found = look
+        for turn in range(4):
+            see(space, 0.0, turn, pose, sectors, readings, EXACT)
+    assert found == looks
+
+
+def test_noise_alone_is_no_evidence():
+    """10,000 readings of a surface at the far side of a cell; each may be 3e-7."""
+    sensors, draw = sensors_of("the papers' three"), np.random.default_rng(0)
+    sectors, pose = sensor_sectors(sensors, CONTROL_POINT_M), np.zeros(3)
+    space, half = make_free_space(160, CELL_M, 3, 17), CELL_M * math.sqrt(0.5)
+    far = math.hypot(23.5 * CELL_M - CONTROL_POINT_M, 0.5 * CELL_M) + half
+    highest = 0.0
+    for noise_m in (0.005, 0.02):
+        for errors in draw.normal(0.0, noise_m, (5_000, 3)):
+            for turn in range(4):
+                readings = noisy(far + errors, noise_m)
+                see(space, 0.0, turn, pose, sectors, readings, EXACT)
+            highest = max(highest, space.evidence[23, 0])
+            assert not cell_is_free(space, 23, 0, 0.0)
+    # By Ville's inequality, it comes to ln(1/p) once in 1/p readings at most.
+    assert 1.0 < highest < 12.0
 
 
 def test_the_window_stays_where_the_robot_is_near_its_middle():
@@ -289,6 +343,36 @@ def test_a_disc_clears_the_cells_that_lie_wholly_in_it():
     assert cell_is_free(space, 10, -7, 2.0), "what was known stays so"
 
 
+def test_a_body_clears_the_cells_that_lie_wholly_in_it():
+    space, pose = make_free_space(100, CELL_M, 1, 2), (0.51, -0.33, 0.4)
+    clear_outline(space, pose, Outline(0.175, 0.41, 0.446), 2.0)
+    c, s = math.cos(0.4), math.sin(0.4)
+    expected = {
+        (i, j)
+        for i in range(-50, 50)
+        for j in range(-50, 50)
+        if all(
+            abs(c * x + s * y) <= 0.175 and abs(c * y - s * x) <= 0.41
+            for x in (i * CELL_M - 0.51, (i + 1) * CELL_M - 0.51)
+            for y in (j * CELL_M + 0.33, (j + 1) * CELL_M + 0.33)
+        )
+    }
+    assert free_cells(space) == expected
+
+
+def test_a_disc_is_free_if_all_cells_that_it_meets_are():
+    space = make_free_space(100, CELL_M, 1, 2)
+    clear_disc(space, 0.0, 0.0, 1.0, 1.0)
+    space.rolled_m[0] = 0.5
+    assert disc_is_free(space, 0.02, -0.01, 0.9)
+    space.free_until[4, 100 - 3] = NEVER  # x from 0.2 m, y up to -0.1 m
+    corner = math.hypot(0.2 - 0.02, 0.1 - 0.01)
+    assert disc_is_free(space, 0.02, -0.01, corner - 1e-6)
+    assert not disc_is_free(space, 0.02, -0.01, corner + 1e-6)
+    space.rolled_m[0] = 1.5
+    assert not disc_is_free(space, 0.02, -0.01, 0.01)
+
+
 def test_the_edge_holds_the_nearest_of_all_cells_that_are_not_free():
     draw = np.random.default_rng(8)
     out, checked = np.empty((4000, 2)), 0
@@ -313,13 +397,10 @@ def test_the_edge_holds_the_nearest_of_all_cells_that_are_not_free():
             checked += 1
             beyond = np.maximum(corners - [x, y], [x, y] - corners - CELL_M)
             expected = np.hypot(*np.maximum(beyond, 0.0).T).min()
-            found = nearest_cell(out, count, CELL_M, x, y)
+            edge = np.maximum(out[:count] - [x, y], [x, y] - out[:count] - CELL_M)
+            found = np.hypot(*np.maximum(edge, 0.0).T).min()
             assert found == pytest.approx(expected, abs=1e-12)
     assert checked > 200
-
-
-def test_without_an_edge_nothing_is_near():
-    assert nearest_cell(np.empty((4, 2)), 0, CELL_M, 0.0, 0.0) == math.inf
 
 
 def test_an_edge_that_is_longer_than_the_list_is_counted_all_the_same():
@@ -364,7 +445,7 @@ def test_cells_count_as_long_as_their_distance_from_the_axle_allows():
     space = make_free_space(160, CELL_M, 3, 17)
     error = PlaceError(0.01, 0.0, 0.41, allowed_m=0.03)
     space.rolled_m[0] = 5.0
-    readings = np.array([[2.0, np.inf]] * 3)
+    readings = exact([[2.0, np.inf]] * 3)
     for tick in range(4):
         see(space, 0.0, tick, np.zeros(3), sectors, readings, error)
     for i, j in free_cells(space):
