@@ -14,7 +14,6 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from diagrams.scenario.run_parameters import StopParameters
 from systems.world.contacts import first_overlap
 from systems.world.geometry import control_point, control_point_velocity
 
@@ -76,7 +75,8 @@ class Collision:
 class RuleNumbers(NamedTuple):
     """Numbers that the stop rules use, except those for contacts."""
 
-    stop: StopParameters
+    stop: Any
+    """``StopParameters`` in which ``diverged_range_m`` is a number."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     follow_distance_m: float

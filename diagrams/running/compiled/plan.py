@@ -151,7 +151,8 @@ class LoopPlan:
                 into = values["", port]
                 # Poses of bodies at rest, and of bodies that move.
                 places: tuple[list[int], list[int]] = ([], [])
-                tables, begin = ([], []), 0
+                tables: tuple[list[Any], list[Any]] = ([], [])
+                begin = 0
                 for other, body in bodies.items():
                     # A body has one pose in the port per rectangle.
                     end = begin + 3 * len(body.shape.rectangles)

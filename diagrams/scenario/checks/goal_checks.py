@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from itertools import combinations
 
 from diagrams.scenario.bodies import Body
+from diagrams.scenario.map_parameters import MapParameters
 from diagrams.scenario.participants import Robot, Router
 from diagrams.scenario.run_parameters import StopParameters
 from systems.base.robot import body_radius
@@ -54,7 +55,7 @@ def check_goals(robots: Mapping[str, Robot], stop: StopParameters) -> None:
 
 
 def check_filled_goals(
-    robots: Mapping[str, Robot], obstacles: Iterable[ObstacleParameters]
+    robots: Mapping[str, Robot], obstacles: Iterable[ObstacleParameters | MapParameters]
 ) -> None:
     """Raises an error if the goal of a route is inside a polygon.
 
@@ -62,7 +63,7 @@ def check_filled_goals(
 
     Args:
         robots: Robots of the scenario, by name.
-        obstacles: Obstacles of the scenario.
+        obstacles: Obstacles of the scenario, and its map.
 
     Raises:
         InputError: A goal is inside a known obstacle at rest with ``polygon_m``.
