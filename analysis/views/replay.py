@@ -575,7 +575,9 @@ _SINGLE: dict[type, Callable[[Any], Any]] = {
     Estimate: lambda _: Sphere(0.06),
     Ball: lambda shape: Sphere(shape.radius),
     Circle: lambda shape: circle(shape.radius, 0.012, 0.03),
-    Outline: lambda shape: outline_band(*shape, 0.012, 0.03),
+    Outline: lambda shape: outline_band(
+        shape.half_length, shape.half_width, 0.012, 0.03
+    ),
     Arrow: lambda _: arrow(),
     Disc: lambda shape: Cylinder(shape.radius, 0.002),
     Contact: lambda _: star(0.16, BODY_HEIGHT_M + 0.05, 0.035),
