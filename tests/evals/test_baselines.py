@@ -118,9 +118,11 @@ def test_the_source_is_reached_and_not_touched(law, follow):
 
 
 def test_a_desk_before_the_robot_is_left():
-    assert (
-        ended("dwa", (4.0, 0.0), [box("desk", 0.475, 0.0, 0.2, 1.4)]).cause == "reached"
-    )
+    """The front is 0.2 m before the desk. Three cones do not see the ends of the desk."""
+    desk = box("desk", 0.475, 0.0, 0.2, 1.4)
+    run = ended("dwa", (4.0, 0.0), [desk], **LIDAR)
+    assert run.collision is None
+    assert np.abs(run.columns["p_WB_y"]).max() > 0.5
 
 
 @pytest.mark.parametrize("source", [(1.7, -1.7), (1.8, 1.8), (-1.9, 0.3)])
