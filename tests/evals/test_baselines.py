@@ -118,7 +118,7 @@ def test_the_source_is_reached_and_not_touched(law, follow):
 
 
 def test_a_desk_before_the_robot_is_left():
-    """The front is 0.2 m before the desk. Three cones do not see the ends of the desk."""
+    """The front is 0.2 m before the desk. Three cones do not see the desk's ends."""
     desk = box("desk", 0.475, 0.0, 0.2, 1.4)
     run = ended("dwa", (4.0, 0.0), [desk], **LIDAR)
     assert run.collision is None
