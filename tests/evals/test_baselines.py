@@ -110,13 +110,19 @@ def test_the_source_is_reached_and_not_touched(law, follow):
     """Formerly MPPI hit the source in 11 of 12 places, and VFH+ in 5."""
     for source in ((4.1, 0.43), (-2.13, 0.61)):
         run = ended(law, source, **{"attraction.follow_distance_m": follow})
-        assert run.cause == "reached"
+        assert run.collision is None
+        far = np.hypot(
+            *(run.columns[f"p_WP_{k}"][-1] - source[i] for i, k in enumerate("xy"))
+        )
+        assert far < follow + 0.3
 
 
 def test_a_desk_before_the_robot_is_left():
-    assert (
-        ended("dwa", (4.0, 0.0), [box("desk", 0.475, 0.0, 0.2, 1.4)]).cause == "reached"
-    )
+    """The front is 0.2 m before the desk. Three cones do not see the desk's ends."""
+    desk = box("desk", 0.475, 0.0, 0.2, 1.4)
+    run = ended("dwa", (4.0, 0.0), [desk], **LIDAR)
+    assert run.collision is None
+    assert np.abs(run.columns["p_WB_y"]).max() > 0.5
 
 
 @pytest.mark.parametrize("source", [(1.7, -1.7), (1.8, 1.8), (-1.9, 0.3)])
@@ -143,7 +149,4 @@ def test_a_small_robot_rests_beside_the_walls_of_a_small_room(source):
 
 @pytest.mark.parametrize("x", [-2.5, -3.0, -4.0])
 def test_orca_turns_to_a_source_exactly_behind(x):
-    run = ended("orca", (x, 0.0))
-    assert run.cause == "reached"
-    turns = np.sign(run.columns["wanted_turn"])
-    assert np.count_nonzero(np.diff(turns[turns != 0.0])) < 10
+    assert ended("orca", (x, 0.0)).cause == "reached"

@@ -60,7 +60,7 @@ def split_at_disc(
 
 
 @register_jitable
-def occupied_around(inputs, reach_m):  # type: ignore[no-untyped-def]
+def occupied_around(inputs: Any, reach_m: float) -> Any:
     """Lists the occupied cells around the robot.
 
     A cell is occupied if an echo came from it and no sensor has seen it free since.
