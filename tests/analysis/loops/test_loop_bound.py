@@ -82,6 +82,7 @@ def test_following_is_bounded_where_the_equilibrium_moves():
     )
     loop = ideal_loop(ideal_scenario(base))
     place = nearest_equilibrium(ForceField(loop), np.array([0.5, 0.1]))
+    assert place is not None
     at = resting_equilibrium(loop, place)
     poles, box = following_poles(at), following_uncertainty(base)
     cloud = pole_cloud(poles, box, period=T, samples=4, seed=1)

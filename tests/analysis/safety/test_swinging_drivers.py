@@ -102,16 +102,16 @@ def test_a_long_run_is_judged_by_the_true_path():
 
 def test_the_table_counts_runs_hours_and_contacts():
     runs = [
-        LongRun("a", "plain", 1800.0, math.inf, 0.05, 0.04, 0.001, None),
-        LongRun("a", "plain", 900.0, 900.0, -0.001, -0.002, 0.07, BY_HAND),
-        LongRun("b", "plain", 3600.0, math.inf, 0.06, 0.03, 0.002, None),
+        LongRun("a", "plain", 1800.0, math.inf, 0.05, 0.001, None),
+        LongRun("a", "plain", 900.0, 900.0, -0.002, 0.07, BY_HAND),
+        LongRun("b", "plain", 3600.0, math.inf, 0.03, 0.002, None),
     ]
     lines = [line.split("|") for line in summary_table(runs, ("driver",)).splitlines()]
     cells = [[text.strip() for text in line[1:-1]] for line in lines[2:]]
     assert cells == [
-        ["a", "2", "0.8", "1", "900", "-1.0", "-2.0", "70.0"],
-        ["b", "1", "1.0", "0", "", "60.0", "30.0", "2.0"],
-        ["all", "3", "1.8", "1", "900", "-1.0", "-2.0", "70.0"],
+        ["a", "2", "0.8", "1", "900", "-2.0", "70.0"],
+        ["b", "1", "1.0", "0", "", "30.0", "2.0"],
+        ["all", "3", "1.8", "1", "900", "-2.0", "70.0"],
     ]
 
 

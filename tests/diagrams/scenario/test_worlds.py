@@ -70,6 +70,7 @@ def test_a_disc_passes_through_each_of_our_worlds():
         ]
         assert ends[0] == ends[1] != 0, name
         straight = math.dist(world.start_m, world.goal_m)
+        assert world.path_length_m is not None
         assert straight < world.path_length_m < 1.5 * straight
 
 
@@ -247,6 +248,7 @@ def test_tests_of_a_map_are_worlds(tmp_path):
     for source in (tmp_path, tmp_path / "maze"):
         assert chosen_worlds(source) == [f"{source}:maze_1"]
     scenario = load_scenario("barn", {"world": f"{tmp_path}:maze_1"})
+    assert scenario.map is not None
     assert scenario.map.file == str(tmp_path / "maze" / "map.yaml")
     assert scenario.only.start.position_m == (0.5, -0.5)
     heading = scenario.only.start.heading_deg

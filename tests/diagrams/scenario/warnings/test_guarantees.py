@@ -67,7 +67,7 @@ def test_a5_is_the_friction_that_the_braking_and_the_lag_need():
 
 @pytest.mark.parametrize(("separation", "names"), [(0.07, set()), (0.055, {"A5"})])
 def test_the_least_margin_has_to_hold_what_a_corner_coasts(separation, names):
-    """0.2 mm of the rims by 0.446 m over half of their distance: 2.5 and 3.2 of 3 mm."""
+    """0.2 mm of the rims by 0.446 m over half their distance: 2.5 and 3.2 of 3 mm."""
     fields = f"robot.wheel_separation_m={separation}", "guard.place_error_m=0.02"
     assert broken(*fields) == names
 
