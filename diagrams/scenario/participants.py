@@ -262,7 +262,8 @@ class Follower(Robot):
         guard = self.guard or GuardParameters()
         if guard.obstacle_speed_m_s is not None:
             return guard
-        return guard.model_copy(update={"obstacle_speed_m_s": 0.6 if guarded else 0.0})
+        speed = self.gains.obstacle_speed_m_s if guarded else 0.0
+        return guard.model_copy(update={"obstacle_speed_m_s": speed})
 
     @property
     def own_map(self) -> GuardParameters:

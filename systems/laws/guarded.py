@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+from systems.framework.parameters import NonNegativeSpeed, Parameters
 from systems.laws.law import Equation, Law
+
+
+class GuardedGains(Parameters):
+    """What the guarded law assumes about obstacles."""
+
+    obstacle_speed_m_s: NonNegativeSpeed = 0.6
+    """Speed that the law's guard assumes for obstacles in view, m/s, if
+    ``guard.obstacle_speed_m_s`` is null. In a world at rest, set 0."""
+
 
 GUARDED = Law(
     name="guarded",
@@ -16,6 +26,7 @@ GUARDED = Law(
             "v = k_v (l - d_f) + k_s v_S, w = k_w (phi_c - theta + A sin(2 pi t/T_w))",
         ),
     ),
+    gains=GuardedGains,
     controller_name="GuardedController",
     guarded=True,
 )

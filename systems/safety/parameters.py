@@ -31,8 +31,9 @@ class GuardParameters(Parameters):
 
     obstacle_speed_m_s: NonNegativeSpeed | None = None
     """Largest speed that the guard assumes for obstacles in view, m/s. With 0, the
-    guard assumes that all obstacles are at rest. With null, the speed is 0.6 m/s for
-    the law ``guarded`` and 0 for other laws."""
+    guard assumes that all obstacles are at rest. With null, the speed is
+    ``laws.guarded.obstacle_speed_m_s`` for the law ``guarded`` and 0 for other
+    laws."""
     braking_m_s2: Acceleration = 1.5
     """Deceleration of the faster wheel's rim when the guard brakes, m/s^2."""
     cell_m: float = Field(default=0.05, ge=0.005, le=0.25)

@@ -107,7 +107,15 @@ def untouched(model: Parameters) -> set[str]:
 def test_one_of_everything_runs(tmp_path):
     scenario = load_scenario(write(tmp_path, ONE_OF_EVERYTHING))
     run, robot = untouched(scenario), untouched(scenario.of_robot("robot").follower)
-    assert run == {"engine", "map", "odor", "radio", "wind"}
+    assert run == {
+        "engine",
+        "map",
+        "odor",
+        "radio",
+        "reference_path_m",
+        "wind",
+        "world",
+    }
     assert robot == {
         "blocks",
         "own_gains",
