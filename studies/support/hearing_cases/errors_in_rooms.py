@@ -156,7 +156,7 @@ def _located(array: str, t60_s: float, seed: int) -> Outcome:
         and abs(math.remainder(source.bearing_deg - drawn.bearing_deg, 360.0)) > 15.0
     ]
     return Outcome(
-        right=level and abs(raised) < max(2.0 * raised_std, 2.0) and raised_std < 25.0,
+        right=level and abs(raised) < max(2.0 * raised_std, 2.0) and raised_std < 15.0,
         said=f"bearing off by {turned:.1f} +-{turned_std:.1f}, elevation by "
         f"{raised:.1f} +-{raised_std:.1f} deg",
         false_claim=not level or bool(claims),

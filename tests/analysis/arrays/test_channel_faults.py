@@ -224,6 +224,17 @@ def test_delays_longer_than_the_array(scale, kind):
         assert found == [(kind, ())]
 
 
+@pytest.mark.parametrize(
+    ("edge_m", "scale"), [(1.0, 0.01), (0.17, 1 / 0.0254), (0.07, 1 / 0.0254)]
+)
+def test_a_tetrahedron_in_other_units(edge_m, scale):
+    """Its delays reach its edges in every direction, so no source is out of sight."""
+    corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    shape = ArrayShape.of(edge_m / math.sqrt(8.0) * np.array(corners))
+    samples = recording(shape, place(shape, 20.0, 4.0))
+    assert faults(samples, ArrayShape.of(scale * shape.p_AM)) == [("units", ())]
+
+
 def test_short_recordings_are_looked_at_within_a_short_reach():
     """Of 0.4 s, cut as 3 m need it (12 crossings), three frames are left: too few.
 

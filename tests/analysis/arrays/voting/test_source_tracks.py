@@ -95,3 +95,15 @@ def test_a_source_that_sounds_again_at_its_place_has_its_identity_back(
 def test_after_a_long_time_it_is_another_source():
     told = follow([lambda t: 0.0 if t < 2.0 or t > 14.0 else None], 170)
     assert {t.identity for _, tracks in told for t in tracks} == {1, 2}
+
+
+@pytest.mark.parametrize(("wander_deg", "largest_std_deg"), [(5.0, 5.0), (0.0, 2.0)])
+def test_errors_that_change_slowly_are_in_the_stated_error(wander_deg, largest_std_deg):
+    """A source at rest, whose detections turn to and fro once a second."""
+    told = follow([lambda t: wander_deg * math.sin(2.0 * math.pi * t)], 100)
+    tracks = [track for _, tracks in told for track in tracks]
+    assert len({track.identity for track in tracks}) == 1
+    off = np.degrees([track.bearing for track in tracks])
+    std = np.degrees([track.bearing_std for track in tracks])
+    assert np.mean(np.abs(off) < 2.0 * std) > 0.9
+    assert np.median(std) < largest_std_deg
