@@ -16,7 +16,7 @@ from analysis.arrays.single_frames import Loudspeaker
 from studies.support.figures import Figure, print_figures, stay_on_one_core
 from systems.base.robot import RobotParameters
 from systems.framework.signals import FRAME_SAMPLES
-from systems.hearing.localise import HearingMemory, Localiser
+from systems.hearing.localize import HearingMemory, Localizer
 from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
@@ -50,26 +50,26 @@ def frames_to_hear() -> dict[str, list[NDArray[np.float32]]]:
 
 
 def frame_time_ms(
-    localiser: Localiser, frames: list[NDArray[np.float32]], memory: HearingMemory
+    localizer: Localizer, frames: list[NDArray[np.float32]], memory: HearingMemory
 ) -> float:
     """Processor time a frame, ms."""
     rounds = []
     for _ in range(ROUNDS + 1):  # the first one compiles
         start = process_time()
         for frame in frames:
-            localiser.localise(frame, memory)
+            localizer.localize(frame, memory)
         rounds.append(process_time() - start)
     return 1e3 * min(rounds[1:]) / len(frames)
 
 
 def frame_figures() -> list[Figure]:
     """Times beside the bounds of the fast method and of maximum likelihood."""
-    gcc = Localiser(TDOAParameters(), SHAPE, C)
-    ml = Localiser(TDOAParameters(method="ml"), SHAPE, C)
+    gcc = Localizer(TDOAParameters(), SHAPE, C)
+    ml = Localizer(TDOAParameters(method="ml"), SHAPE, C)
     frames = frames_to_hear()
     memory = gcc.blank()
     for frame in frames["noise"]:
-        _, memory = gcc.localise(frame, memory)
+        _, memory = gcc.localize(frame, memory)
     return [
         Figure(f"{title}, ms a frame", frame_time_ms(*heard, memory), "<=", bound)
         for title, heard, bound in (

@@ -31,7 +31,7 @@ from systems.base.wheel_speed_command import (
 from systems.framework.noise import standard_normals
 from systems.framework.signals import TICK_S
 from systems.hearing.source_fix import SourceFix
-from systems.hearing.tdoa_estimator import port_values, robot_localiser
+from systems.hearing.tdoa_estimator import port_values, robot_localizer
 from systems.hearing.tracking.tracker_model import (
     blank_track,
     track_step,
@@ -81,14 +81,14 @@ class PlainLoop:
             scenario.follower.tracker, scenario.only.robot, 1.5 * T
         )
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
-        self.localiser, self.p_PA_B = robot_localiser(
+        self.localizer, self.p_PA_B = robot_localizer(
             scenario.follower.tdoa, scenario.only.robot, c
         )
 
     def run(self) -> NDArray[np.float64]:
         """(ticks + 1, 7) states of the plant at every tick."""
         scenario = self.scenario
-        self.memory = self.localiser.blank()
+        self.memory = self.localizer.blank()
         state = [*scenario.only.start.pose, 0.0, 0.0, 0.0, 0.0]
         odometry, angles = list(scenario.only.start.pose), [0.0, 0.0]
         self.track = blank_track(self.tracker, odometry)
@@ -209,7 +209,7 @@ class PlainLoop:
             seed=self.mic_seed,
         )
         history[:, :-1] = history[:, 1:]
-        fix, self.memory = self.localiser.localise(audio.counts, self.memory)
+        fix, self.memory = self.localizer.localize(audio.counts, self.memory)
         return fix, now
 
     def _drive(self, state: Any, wheels: Any) -> Any:

@@ -242,7 +242,7 @@ def test_walls_sources_robots_and_what_was_hit_are_shown(
 
 
 def test_the_floor_that_is_known_grows(tmp_path: Path, browser: Any) -> None:
-    """It is light green, on a floor of grey; the robot drives into the open."""
+    """It is light green, on a floor of gray; the robot drives into the open."""
     overrides = ["hearing=ideal", "guard={}", "duration_s=4"]
     result = simulate(load_scenario("two_static_obstacles", overrides))
     write_replay(result, tmp_path / "replay.html")

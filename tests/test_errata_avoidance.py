@@ -287,7 +287,7 @@ def test_han_3_3_speed_force_falls_to_zero_at_mu_0(law, part) -> None:
 
 
 def test_han_mu_0_is_below_the_closing_speed() -> None:
-    """0.72 m/s towards an obstacle that comes at 0.3 m/s."""
+    """0.72 m/s toward an obstacle that comes at 0.3 m/s."""
     law = LAW.model_copy(update={"speed_limit_m_s": 0.72})
     top_speed = RobotParameters().top_speed_m_s
     assert top_speed + 0.3 == pytest.approx(1.02)

@@ -41,6 +41,6 @@ class ArrayBody(Parameters):
         c: float,
     ) -> RigidSphere:
         """Makes the sphere with microphones at (n, d) positions, m."""
-        towards = np.array(microphones)
-        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-        return RigidSphere(towards, self.sphere_m, band_hz, c)
+        toward = np.array(microphones)
+        toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+        return RigidSphere(toward, self.sphere_m, band_hz, c)

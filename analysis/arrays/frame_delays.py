@@ -240,7 +240,7 @@ def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
 def _with_exchanged(shape: ArrayShape, i: int, j: int) -> ArrayShape:
     body = shape.body
     if body is not None:
-        body = replace(body, towards=exchanged(body.towards, i, j))
+        body = replace(body, toward=exchanged(body.toward, i, j))
     return replace(shape, p_AM=exchanged(shape.p_AM, i, j), body=body)
 
 

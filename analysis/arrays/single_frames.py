@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays.cramer_rao import SlopeEnergy
 from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S, Emission
-from systems.hearing.localise import Localiser
+from systems.hearing.localize import Localizer
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
@@ -34,8 +34,8 @@ def frame_estimator(
     If the frame has no detectable sound, the function returns None. If ``limited`` is
     false, the function also returns unreliable estimates.
     """
-    localiser = Localiser(parameters, shape, c, limited=limited)
-    return lambda frame: localiser.localise(frame, localiser.blank())[0]
+    localizer = Localizer(parameters, shape, c, limited=limited)
+    return lambda frame: localizer.localize(frame, localizer.blank())[0]
 
 
 @dataclass(frozen=True)

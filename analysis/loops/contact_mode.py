@@ -1,4 +1,4 @@
-"""Contact mode: largest stable stiffness of the motion straight towards an obstacle.
+"""Contact mode: largest stable stiffness of the motion straight toward an obstacle.
 
 The push of the law acts as a spring between the robot and a nearby obstacle. Its
 stiffness adds to that of the attraction. The damping is that of the attraction alone.
@@ -145,7 +145,7 @@ def contact_model(
     approach_damping_n_s_m: float = 0.0,
     period_s: float | None = None,
 ) -> LinearModel:
-    """Returns the sampled model of the robot's motion straight towards an obstacle.
+    """Returns the sampled model of the robot's motion straight toward an obstacle.
 
     ``stiffness_n_m`` is the sum of the stiffnesses of attraction and push. Both forces
     depend on a position that is ``latency_ticks`` control periods old. In the diagram,
@@ -189,7 +189,7 @@ class ContactOptions(TypedDict, total=False):
 def largest_contact_stiffness(
     scenario: Scenario, **options: Unpack[ContactOptions]
 ) -> float:
-    """Returns the largest stable stiffness of the motion towards an obstacle, N/m.
+    """Returns the largest stable stiffness of the motion toward an obstacle, N/m.
 
     The stiffness is the sum of the stiffnesses of attraction and push. It is 0 if no
     stiffness is stable, for example without damping. It is infinite if all stiffnesses
@@ -211,7 +211,7 @@ def largest_contact_stiffness(
 
 @dataclass(frozen=True)
 class ContactLimits:
-    """Largest gains for which the motion towards an obstacle at rest is stable.
+    """Largest gains for which the motion toward an obstacle at rest is stable.
 
     The rows of the tables are motor lags, and the columns are latencies of the echo.
     """

@@ -70,7 +70,7 @@ _FIRST_CELL_M = 0.25
 CONTACT_M = 4e-3
 #: Largest number of bodies whose pushes are added with ``aggregation: sum``.
 _SLOTS = 3
-#: Number of steps towards the point of a convex hull that is nearest to the origin.
+#: Number of steps toward the point of a convex hull that is nearest to the origin.
 _HULL_STEPS = 6
 #: Number of steps of Newton's method to a switching point.
 _NEWTON_STEPS = 25

@@ -121,7 +121,7 @@ def late_ticks(box: Box) -> range:
 
 
 def contact_families(scenario: Scenario) -> BoxFamilies:
-    """Returns a function from a box to the loops of the motion towards an obstacle."""
+    """Returns a function from a box to the loops of the motion toward an obstacle."""
     own = scenario.follower.attraction
 
     def families(box: Box) -> Sequence[Family]:

@@ -50,7 +50,7 @@ class OperatingPoint:
     p_WP: NDArray[np.float64]
     """(2,) position of the control point P in W at ``time_s``, m."""
     theta_WB: float
-    """Heading towards the source, rad. At rest, P is in equilibrium at any heading."""
+    """Heading toward the source, rad. At rest, P is in equilibrium at any heading."""
     v_WS: NDArray[np.float64]
     """(2,) velocity of the source in W, m/s. The robot has the same velocity."""
     force_n: float
@@ -87,7 +87,7 @@ class OperatingPoint:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """(2, 2) unit vectors in W: row 0 towards the source, row 1 to the left."""
+        """(2, 2) unit vectors in W: row 0 toward the source, row 1 to the left."""
         c, s = math.cos(self.theta_WB), math.sin(self.theta_WB)
         return np.array([[c, s], [-s, c]])
 
@@ -194,7 +194,7 @@ def motion_model(
 def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> OperatingPoint:
     """Returns the equilibrium at rest with P at (2,) ``p_WP`` in W, m.
 
-    The robot heads towards the source. Raises InputError if a force acts at ``p_WP`` or
+    The robot heads toward the source. Raises InputError if a force acts at ``p_WP`` or
     a body moves.
     """
     field_ = ForceField(loop)
@@ -257,7 +257,7 @@ def moving_equilibrium(
         return loop.settled_state(pose, (vx, vy), _STEADY_S)
 
     def pull(distance: float) -> float:
-        """Acceleration from the law towards the source at a distance in m, m/s^2."""
+        """Acceleration from the law toward the source at a distance in m, m/s^2."""
         state, time_s = settled(distance)
         read = [("controller", "acceleration_W")]
         return float(loop.period_derivatives(state, time_s, outputs=read).y @ heading)

@@ -97,16 +97,16 @@ def _radial_force(
     vx, vy = v_WP
     f = _lookup(tables[0], c)
     if term > 0.5:
-        towards = (vx * cx + vy * cy) / max(c, 1e-12)
+        toward = (vx * cx + vy * cy) / max(c, 1e-12)
         if term > 1.5:
-            s = max(0.0, towards)
+            s = max(0.0, toward)
         elif across == 1.0:
             s = math.sqrt(vx * vx + vy * vy)
         elif across > 0.0:
             aside = across * (vx * cy - vy * cx) / max(c, 1e-12)
-            s = math.sqrt(towards * towards + aside * aside)
+            s = math.sqrt(toward * toward + aside * aside)
         else:
-            s = abs(towards)
+            s = abs(toward)
         f += _increment(tables[2], c, s)
     return f
 

@@ -222,7 +222,7 @@ def pole_sensitivities(
     """Computes the derivatives of the slowest pole by finite differences.
 
     The differences are central, with two exceptions. If the nominal value is an end of
-    the interval, the parameter varies only towards the inside. A parameter with whole
+    the interval, the parameter varies only toward the inside. A parameter with whole
     numbers varies over its whole interval. After a variation, the pole nearest to the
     nominal pole counts as the same pole. This is valid for simple poles. ``period`` is
     the control period, s.
@@ -254,9 +254,9 @@ def following_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
 
 
 def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
-    """Returns the uncertain parameters of the motion straight towards an obstacle.
+    """Returns the uncertain parameters of the motion straight toward an obstacle.
 
-    Raises InputError if the push of the law does not grow towards the obstacle.
+    Raises InputError if the push of the law does not grow toward the obstacle.
     """
     stiffness = radial_law(scenario).stiffest_n_m
     if stiffness <= 0.0:
@@ -360,7 +360,7 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
 
 
 def contact_poles(scenario: Scenario) -> PoleFunction:
-    """Returns a function for the z-plane poles of the motion towards an obstacle.
+    """Returns a function for the z-plane poles of the motion toward an obstacle.
 
     The robot is at the distance from the obstacle at which the law is stiffest.
     """

@@ -42,7 +42,7 @@ class StepCheck:
     """Oscillation fitted to the simulation with the scenario's own sensors. None if
     this simulation was not requested."""
     step_m: float
-    """Distance of the start from the equilibrium towards the source, m."""
+    """Distance of the start from the equilibrium toward the source, m."""
     time_s: NDArray[np.float64] = field(repr=False)
     """(n,) times, s."""
     predicted_m: NDArray[np.float64] = field(repr=False)
@@ -78,7 +78,7 @@ def check_step(
 ) -> StepCheck:
     """Simulates a start near the equilibrium and compares it with the linear model.
 
-    The start is ``step_m`` from the equilibrium towards the source. Bodies rest where
+    The start is ``step_m`` from the equilibrium toward the source. Bodies rest where
     they are at 0 s. If ``full`` is true, the scenario is also simulated with its own
     sensors. Raises InputError if there is no stable equilibrium, or if the linear model
     does not oscillate.
@@ -133,7 +133,7 @@ def _run(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Simulated times, s, and distances of P from the source, m.
 
-    The start is ``step_m`` from the equilibrium ``point`` towards the source.
+    The start is ``step_m`` from the equilibrium ``point`` toward the source.
     """
     ahead = np.array([math.cos(point.theta_WB), math.sin(point.theta_WB)])
     epsilon = scenario.only.robot.control_point_m

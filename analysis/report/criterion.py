@@ -10,7 +10,7 @@ from typing import Generic, Literal, TypeVar, cast
 #: Unit of a number that is 1 for true and 0 for false.
 YES_OR_NO = "yes or no"
 
-Judgement = Literal["pass", "fail", "undecided", "not applicable"]
+Judgment = Literal["pass", "fail", "undecided", "not applicable"]
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Criterion(Generic[Data]):
         if met and proven is not None and not self.met_by(proven):
             return self._verdict(value, "undecided", _UNDECIDED, where, proven)
         word, text = ("pass", self.good) if met else ("fail", self.bad)
-        return self._verdict(float(value), cast("Judgement", word), text, where, proven)
+        return self._verdict(float(value), cast("Judgment", word), text, where, proven)
 
     def without_number(self, reason: str) -> Verdict:
         """Returns the verdict ``not applicable``; ``reason`` is its text, a clause."""
@@ -100,7 +100,7 @@ class Criterion(Generic[Data]):
     def _verdict(
         self,
         value: float | None,
-        verdict: Judgement,
+        verdict: Judgment,
         text: str,
         where: str = "",
         proven: float | None = None,
@@ -129,7 +129,7 @@ class Verdict:
     """Part of the system that has the number; empty if there is only one part."""
     unit: str
     threshold: str
-    verdict: Judgement
+    verdict: Judgment
     text: str
     """Clause that states what follows, or why there is no number."""
     source: str
@@ -149,7 +149,7 @@ class VerdictRow:
     values: dict[str, float | None]
     proven: dict[str, float | None]
     """Values that no case passes, see ``Verdict``."""
-    verdicts: dict[str, Judgement]
+    verdicts: dict[str, Judgment]
     text: str
     """Texts of the verdicts. Laws with the same text share one sentence. With a single
     law, the text also states where the number is from."""

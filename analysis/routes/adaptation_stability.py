@@ -298,8 +298,8 @@ def _lyapunov(loop: PointLoop, wanted: tuple[float, float]) -> LyapunovRun:
         force = target_force((p, 0.0), (v, 0.0), at, stiffness, damping)[0]
         source = sensitivity_sources((p, 0.0), (v, 0.0), at, [], mass)
         a_r = frequency**2 * (p_d - p_r) + 2.0 * ratio * frequency * (v_d - v_r)
-        learnt = -rate * (v - v_r)
-        grown = learnt * source.stiffness[0], learnt * source.damping[0]
+        learned = -rate * (v - v_r)
+        grown = learned * source.stiffness[0], learned * source.damping[0]
         return [v, force / mass, v_r, a_r, *grown]
 
     begin = [0.0, targets[0, 2], 0.0, targets[0, 2], *start]

@@ -102,12 +102,12 @@ def drive_step(tick: int, state: Any, inputs: Any, outputs: Any, numbers: Any) -
     swing_v, swing_omega, rate, phase, edge, skew = table[row + 7 : row + 13]
     if mode > 0.5:
         pose = true if by_truth > 0.5 else believed
-        towards = math.atan2(y - pose[1], x - pose[0])
+        toward = math.atan2(y - pose[1], x - pose[0])
         if mode > 2.5:
-            towards, v, omega = towards - omega, 0.0, 0.0
+            toward, v, omega = toward - omega, 0.0, 0.0
         elif mode > 1.5:
-            towards, v = towards + math.pi, -v
-        off = (towards - pose[2] + math.pi) % math.tau - math.pi
+            toward, v = toward + math.pi, -v
+        off = (toward - pose[2] + math.pi) % math.tau - math.pi
         omega += min(max(4.0 * off, -3.0), 3.0)
         v *= max(math.cos(off), 0.0)
     angle = rate * tick
@@ -236,10 +236,10 @@ def _wedge(draw: np.random.Generator) -> list[tuple[float, ...]]:
     angle, half = draw.uniform(-math.pi, math.pi), draw.uniform(0.3, 1.1)
     far, boxes = START_BUBBLE_M + draw.uniform(0.2, 1.2), []
     for side in (half, -half):
-        towards = angle + math.pi + side
-        x = far * math.cos(angle) + 1.0 * math.cos(towards)
-        y = far * math.sin(angle) + 1.0 * math.sin(towards)
-        boxes.append(_box(x, y, towards, 2.0, 0.05))
+        toward = angle + math.pi + side
+        x = far * math.cos(angle) + 1.0 * math.cos(toward)
+        y = far * math.sin(angle) + 1.0 * math.sin(toward)
+        boxes.append(_box(x, y, toward, 2.0, 0.05))
     return boxes
 
 

@@ -395,7 +395,7 @@ class _Recorder:
         middle = 0.5 * ROBOT_HEIGHT_M + 0.02
         self.put(f"{path}/body", body, thing.color, _placed(0.0, 0.0, middle))
         radius = own.wheel_radius_m
-        tyre = Cylinder(radius, _WHEEL_WIDTH_M)
+        tire = Cylinder(radius, _WHEEL_WIDTH_M)
         spoke = Block(1.7 * radius, 0.25 * radius, _WHEEL_WIDTH_M + 0.004)
         for side, angles in wheel_angles(own, thing.poses).items():
             y = (0.5 if side == "left" else -0.5) * own.wheel_separation_m
@@ -403,7 +403,7 @@ class _Recorder:
             axle = _placed(0.0, y, radius, roll=-0.5 * math.pi)
             self.meshcat.SetTransform(f"{path}/{side}", axle)
             wheel, still = f"{path}/{side}/wheel", np.zeros(len(angles))
-            self.put(f"{wheel}/tyre", tyre, "#1F1F1F")
+            self.put(f"{wheel}/tire", tire, "#1F1F1F")
             self.put(f"{wheel}/spoke", spoke, "whitesmoke")
             poses = np.column_stack([still, still, angles])
             self._move(Thing(wheel, Frame(), "", thing.times, poses))
@@ -413,12 +413,12 @@ class _Recorder:
             self._loudspeaker(path, ROBOT_HEIGHT_M)
 
     def _microphones(self, path: str, own: RobotParameters) -> None:
-        grey, x, height = "#595961", own.control_point_m - 0.01, _MICROPHONE_HEIGHT_M
+        gray, x, height = "#595961", own.control_point_m - 0.01, _MICROPHONE_HEIGHT_M
         bar = Block(0.02, own.width_m, 0.02)
-        self.put(f"{path}/bar", bar, grey, _placed(x, 0.0, height - 0.03))
+        self.put(f"{path}/bar", bar, gray, _placed(x, 0.0, height - 0.03))
         mast = Cylinder(0.012, height - ROBOT_HEIGHT_M)
         middle = 0.5 * (height + ROBOT_HEIGHT_M) - 0.02
-        self.put(f"{path}/mast", mast, grey, _placed(x, 0.0, middle))
+        self.put(f"{path}/mast", mast, gray, _placed(x, 0.0, middle))
         for number, (u, v) in enumerate(microphones_B(own), start=1):
             ball, at = Sphere(0.028), _placed(u, v, height)
             self.put(f"{path}/microphone_{number}", ball, "#0D0D0D", at)

@@ -1,6 +1,6 @@
 """Oscillation before an obstacle: harmonic balance compared with simulation.
 
-In the simulation, the robot has exact sensors and drives head-on towards a wide box.
+In the simulation, the robot has exact sensors and drives head-on toward a wide box.
 ``studies.nonlinear.harmonic_balance`` computes the prediction.
 """
 

@@ -1,7 +1,7 @@
 """Head-on equilibria of the active law as functions of the stiffness ratio k_ref/K_0.
 
 k_ref is the reference stiffness of the law, and K_0 its matched stiffness. In a head-on
-approach, the robot moves straight towards an obstacle that lies before the goal.
+approach, the robot moves straight toward an obstacle that lies before the goal.
 """
 
 from __future__ import annotations

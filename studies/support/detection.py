@@ -11,7 +11,7 @@ import numpy as np
 from analysis.arrays.single_frames import Loudspeaker
 from systems.framework.noise import tick_generator
 from systems.framework.signals import FRAME_SAMPLES, TICK_S
-from systems.hearing.localise import HearingMemory, Localiser
+from systems.hearing.localize import HearingMemory, Localizer
 from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
@@ -65,17 +65,17 @@ def false_alarms(
     Returns:
         How many of the frames were taken for a sound, one a rate.
     """
-    localisers = [
-        Localiser(TDOAParameters(false_alarm_rate=rate), shape, c) for rate in rates
+    localizers = [
+        Localizer(TDOAParameters(false_alarm_rate=rate), shape, c) for rate in rates
     ]
-    memories = [localiser.blank() for localiser in localisers]
+    memories = [localizer.blank() for localizer in localizers]
     counts = [0] * len(rates)
     for tick in range(frames):
         noise = tick_generator(seed, tick).standard_normal(
             (shape.count, FRAME_SAMPLES), dtype=np.float32
         )
-        for k, localiser in enumerate(localisers):
-            _, after = localiser.localise(noise, memories[k])
+        for k, localizer in enumerate(localizers):
+            _, after = localizer.localize(noise, memories[k])
             # What is heard says nothing about the noise.
             counts[k] += after.energy == memories[k].energy
             memories[k] = after
@@ -111,11 +111,11 @@ def detection_curve(
     Returns:
         Frames located, ranged and wrong, one a level.
     """
-    localiser = Localiser(parameters or TDOAParameters(), shape, c)
+    localizer = Localizer(parameters or TDOAParameters(), shape, c)
     points = []
     for level in levels_db:
         noise_pa = loudspeaker.level_pa / range_m * 10.0 ** (-level / 20.0)
-        memory = _after_noise(localiser, noise_pa, seed)
+        memory = _after_noise(localizer, noise_pa, seed)
         heard = ranged = wrong = 0
         for trial in range(trials):
             rng = tick_generator(seed, trial)
@@ -124,7 +124,7 @@ def detection_curve(
             begin = rng.uniform(0.1, loudspeaker.seconds - 2.0 * TICK_S)
             frame = loudspeaker.pressure(begin, p_AS, shape.p_AM, c)
             frame += noise_pa * rng.standard_normal(frame.shape, dtype=np.float32)
-            fix, _ = localiser.localise(frame, memory)
+            fix, _ = localizer.localize(frame, memory)
             if fix is None:
                 continue
             heard += 1
@@ -135,10 +135,10 @@ def detection_curve(
     return points
 
 
-def _after_noise(localiser: Localiser, noise_pa: float, seed: int) -> HearingMemory:
-    memory = localiser.blank()
-    shape = (localiser.plan.shape.count, FRAME_SAMPLES)
+def _after_noise(localizer: Localizer, noise_pa: float, seed: int) -> HearingMemory:
+    memory = localizer.blank()
+    shape = (localizer.plan.shape.count, FRAME_SAMPLES)
     for k in range(_NOISE_FRAMES):
         noise = tick_generator(seed, -1 - k).standard_normal(shape, dtype=np.float32)
-        _, memory = localiser.localise(np.float32(noise_pa) * noise, memory)
+        _, memory = localizer.localize(np.float32(noise_pa) * noise, memory)
     return memory

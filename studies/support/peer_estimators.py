@@ -36,10 +36,10 @@ Estimator = Callable[[Frame], tuple[float, float]]
 def ours(method: str) -> Estimator:
     """The estimator of ``TDOAEstimator``."""
     parameters = TDOAParameters.model_validate({"method": method})
-    localise = frame_estimator(parameters, SHAPE, C)
+    localize = frame_estimator(parameters, SHAPE, C)
 
     def estimate(frame: Frame) -> tuple[float, float]:
-        fix = localise(frame)
+        fix = localize(frame)
         if fix is None:
             return math.nan, math.nan
         return fix.bearing, fix.range if fix.range_valid else math.nan

@@ -1,7 +1,7 @@
 """How well a burst is located in reverberant rooms, over random layouts.
 
 Robot and source rest. A burst reaches the microphones through the room's
-response, frames go through the converter, ``systems.hearing.localise`` and the tracker,
+response, frames go through the converter, ``systems.hearing.localize`` and the tracker,
 as they do in the diagram, and what the tracker holds when the burst is over is
 compared with the truth. No diagram is built, so that a layout costs little more
 than its response.
@@ -21,9 +21,9 @@ from diagrams.scenario.bodies import microphones_W
 from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise, tick_generator
 from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S
-from systems.hearing.localise import Localiser
+from systems.hearing.localize import Localizer
 from systems.hearing.parameters import TDOAParameters, TrackerParameters
-from systems.hearing.tdoa_estimator import port_values, robot_localiser
+from systems.hearing.tdoa_estimator import port_values, robot_localizer
 from systems.hearing.tracking.tracker_model import (
     TrackerNumbers,
     blank_track,
@@ -153,7 +153,7 @@ def locate_bursts(
     microphones = MicArrayParameters(snr_db_at_1m=snr_db_at_1m)
     images = room_images(room, SOUND_SPEED_M_S)
     burst = make_waveform(sound, seed)[: round(sound.on_s * SAMPLE_RATE_HZ)]
-    localiser, p_PA_B = robot_localiser(
+    localizer, p_PA_B = robot_localizer(
         parameters or TDOAParameters(), robot, SOUND_SPEED_M_S
     )
     tracker = tracker_numbers(
@@ -166,7 +166,7 @@ def locate_bursts(
             room, layout.p_WS, p_WM, SOUND_SPEED_M_S, images=images
         )
         frames = _frames(response, burst, microphones, seed + k)
-        estimates = _estimates(frames, localiser, p_PA_B)
+        estimates = _estimates(frames, localizer, p_PA_B)
         errors.append(_errors(_tracked(estimates, tracker, layout.pose_WB), layout))
     bearing, distance = np.array(errors).T
     return RoomResult(layouts, bearing, distance)
@@ -200,13 +200,13 @@ def _frames(
 
 def _estimates(
     frames: Iterator[NDArray[np.int16]],
-    localiser: Localiser,
+    localizer: Localizer,
     p_PA_B: NDArray[np.float64],
 ) -> Iterator[tuple[NDArray[np.float64], ...]]:
     """The estimate of each frame, as the tracker takes it."""
-    memory = localiser.blank()
+    memory = localizer.blank()
     for frame in frames:
-        fix, memory = localiser.localise(frame, memory)
+        fix, memory = localizer.localize(frame, memory)
         yield port_values(fix, p_PA_B)[2:6]
 
 

@@ -23,7 +23,7 @@ def spiral_sphere(count: int) -> NDArray[np.float64]:
 
 
 def sphere_recording(
-    towards: NDArray[np.float64],
+    toward: NDArray[np.float64],
     radius_m: float,
     u: NDArray[np.float64],
     sound: NDArray[np.float64],
@@ -36,7 +36,7 @@ def sphere_recording(
     """Simulates microphones on a rigid sphere in a plane wave.
 
     Args:
-        towards: (n, 3) unit vectors from the center to the microphones.
+        toward: (n, 3) unit vectors from the center to the microphones.
         radius_m: Radius of the sphere, m.
         u: (3,) unit vector to the source.
         sound: (samples,) sound of the source.
@@ -50,7 +50,7 @@ def sphere_recording(
     """
     size = 2 * len(sound)
     ka = 2.0 * math.pi * np.fft.rfftfreq(size, 1.0 / sample_rate_hz) * radius_m / c
-    angle = np.arccos(np.clip(towards @ u, -1.0, 1.0))
+    angle = np.arccos(np.clip(toward @ u, -1.0, 1.0))
     known = np.linspace(1e-3, ka[-1], _VALUES)
     pressure = surface_pressure(known, angle)
     level, phase = np.abs(pressure), np.unwrap(np.angle(pressure), axis=0)

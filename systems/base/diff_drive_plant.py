@@ -10,7 +10,7 @@ from pydrake.systems.framework import BasicVector_
 
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
-from systems.base.tyre_grip import GripNumbers, grip_accelerations
+from systems.base.tire_grip import GripNumbers, grip_accelerations
 from systems.framework.block import Block_, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.finite import check_finite, check_port

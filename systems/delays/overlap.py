@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 
 #: Length of the raised-cosine edges of the cut channels, samples. Sharp edges would
-#: shift the peak of a correlation towards whole samples. The shift is inversely
+#: shift the peak of a correlation toward whole samples. The shift is inversely
 #: proportional to the length of the frame and to the squared bandwidth. For a 25 ms
 #: frame at 50 kHz, the shift is 2e-3 samples, as much as the error due to noise at 30
 #: dB. Soft edges reduce the shift to a twentieth. If the edges also follow the

@@ -61,7 +61,7 @@ class DelayProblem(NamedTuple):
     span: NDArray[np.float64]
     """(r, d) orthonormal basis of the span of the microphones."""
     side: NDArray[np.float64]
-    """(d,) unit vector perpendicular to the span, towards the side on which sources are
+    """(d,) unit vector perpendicular to the span, toward the side on which sources are
     reported. Zeros if the span is the whole space."""
 
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
-from systems.hearing.localise import Candidate
+from systems.hearing.localize import Candidate
 from systems.hearing.tracking.target_filter import NEVER_HEARD_S, SPEED_STD
 from systems.sound.array_shape import ArrayShape
 

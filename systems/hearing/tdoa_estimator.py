@@ -13,7 +13,7 @@ from systems.base.robot import RobotParameters
 from systems.framework.block import OBJECT, Port
 from systems.framework.signals import AudioFrame
 from systems.hearing.frame_block import FrameBlock
-from systems.hearing.localise import HearingMemory, Localiser
+from systems.hearing.localize import HearingMemory, Localizer
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_choice import Belief, ChoiceMemory, SourceChoice
 from systems.hearing.source_fix import NOTHING_HEARD, REJECTED, SourceFix
@@ -23,14 +23,14 @@ from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
 
-def robot_localiser(
+def robot_localizer(
     parameters: TDOAParameters,
     robot: RobotParameters,
     sound_speed_m_s: float,
     microphones: MicArrayParameters = MicArrayParameters(),
     *,
     limited: bool = True,
-) -> tuple[Localiser, NDArray[np.float64]]:
+) -> tuple[Localizer, NDArray[np.float64]]:
     """Makes the sound localizer for the microphones of a robot.
 
     Args:
@@ -45,7 +45,7 @@ def robot_localiser(
         point P, in the axes of the body frame B, m.
     """
     shape = ArrayShape.of(robot.microphones_m)
-    localiser = Localiser(
+    localizer = Localizer(
         parameters,
         shape,
         sound_speed_m_s,
@@ -53,11 +53,11 @@ def robot_localiser(
         frame_samples=microphones.frame_samples,
         limited=limited,
     )
-    return localiser, np.mean(robot.microphones_m, axis=0)
+    return localizer, np.mean(robot.microphones_m, axis=0)
 
 
 def robot_choice(
-    localiser: Localiser,
+    localizer: Localizer,
     robot: RobotParameters,
     p_PA_B: NDArray[np.float64],
     frame_s: float,
@@ -65,7 +65,7 @@ def robot_choice(
     """Makes the ``SourceChoice`` for the sounds that the localizer of a robot finds.
 
     Args:
-        localiser: Localizer from ``robot_localiser``. Its parameters contain the first
+        localizer: Localizer from ``robot_localizer``. Its parameters contain the first
             bearing of the source.
         robot: Parameters of the body. The function uses the distance of the control
             point P ahead of the axle.
@@ -76,10 +76,10 @@ def robot_choice(
     Returns:
         The choice.
     """
-    degrees = localiser.parameters.first_bearing_deg
+    degrees = localizer.parameters.first_bearing_deg
     return SourceChoice(
-        localiser.plan.shape,
-        localiser.plan.c,
+        localizer.plan.shape,
+        localizer.plan.c,
         p_PA_B + np.array([robot.control_point_m, 0.0]),
         frame_s,
         None if degrees is None else math.radians(degrees),
@@ -128,7 +128,7 @@ class _Memory(NamedTuple):
 class TDOAEstimator(FrameBlock):
     """Estimates where the sound source is from the audio frames of the microphones.
 
-    The module ``systems.hearing.localise`` measures the delays of all pairs of
+    The module ``systems.hearing.localize`` measures the delays of all pairs of
     channels. It finds the position that explains the delays, and the errors of this
     position.
 
@@ -198,16 +198,16 @@ class TDOAEstimator(FrameBlock):
         super().__init__()
         self._schedule = sound if parameters.schedule_known else None
         self._longest_way_s = MAXIMUM_RANGE_M / sound_speed_m_s
-        self._localiser, self._p_PA_B = robot_localiser(
+        self._localizer, self._p_PA_B = robot_localizer(
             parameters, robot, sound_speed_m_s, microphones, limited=limited
         )
         self.set_name("tdoa_estimator")
         self._choice = None
-        blank = _Memory(self._localiser.blank(), None)
-        example = _Memory(self._localiser.full(), None)
+        blank = _Memory(self._localizer.blank(), None)
+        example = _Memory(self._localizer.full(), None)
         if parameters.choose == "followed":
             self._choice = robot_choice(
-                self._localiser, robot, self._p_PA_B, microphones.frame_s
+                self._localizer, robot, self._p_PA_B, microphones.frame_s
             )
             self.inputs = (*self.inputs, *_BELIEF)
             blank = blank._replace(choice=self._choice.blank())
@@ -229,9 +229,9 @@ class TDOAEstimator(FrameBlock):
             self._microphones.frame_s,
         )
         if self._choice is None or chosen is None:
-            fix, after = self._localiser.localise(frame.counts, before)
+            fix, after = self._localizer.localize(frame.counts, before)
         else:
-            found, after = self._localiser.candidates(frame.counts, before)
+            found, after = self._localizer.candidates(frame.counts, before)
             best, chosen = self._choice.choose(
                 found, chosen, _belief(inputs), may_sound=sounds
             )

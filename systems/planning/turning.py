@@ -46,7 +46,7 @@ def slowed_by(error: float, speed: float) -> float:
 
 
 @register_jitable
-def turn_towards(speed: float, heading: float, theta: float) -> tuple[float, float]:
+def turn_toward(speed: float, heading: float, theta: float) -> tuple[float, float]:
     """Computes the speed and yaw rate that turn a moving robot to a heading.
 
     Args:

@@ -55,7 +55,7 @@ class Way(NamedTuple):
     """(m, m) cost of the cheapest route from each cell to the goal. The cost is valid
     only for cells that the search has reached.
     """
-    towards: NDArray[np.int32]
+    toward: NDArray[np.int32]
     """(m, m) number of the next cell on the route to the goal."""
     queue: NDArray[np.int32]
     """(k, 2) number of a cell, and index of the next entry in its bucket."""
@@ -154,9 +154,9 @@ def find_way(
             )
             dearest = max(dearest, way.price[i, j])
         points += 1
-        if at == gi * size + gj or way.towards[i, j] < 0:
+        if at == gi * size + gj or way.toward[i, j] < 0:
             break
-        at = way.towards[i, j]
+        at = way.toward[i, j]
     way.points[0], way.length_m[0], way.dearest[0] = points, length, dearest
 
 
@@ -271,7 +271,7 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
     """
     size = way.price.shape[0]
     way.cost[:, :] = _FAR
-    way.towards[:, :] = -1
+    way.toward[:, :] = -1
     way.heads[:, 0] = -1
     way.cost[goal // size, goal % size] = 0
     way.queue[0, 0], way.queue[0, 1] = goal, -1
@@ -302,7 +302,7 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
                 new = cost + step * way.price[i, j]
                 if new < way.cost[a, b] and entries < len(way.queue):
                     way.cost[a, b] = new
-                    way.towards[a, b] = at
+                    way.toward[a, b] = at
                     bucket = new % _BUCKETS
                     way.queue[entries, 0] = a * size + b
                     way.queue[entries, 1] = way.heads[bucket, 0]

@@ -141,7 +141,7 @@ def _turn_surface(
     old = np.array([x / far, y / far])
     new, across = np.array([along[0], along[1]]), np.array([-along[1], along[0]])
     old_across = np.array([-old[1], old[0]])
-    # Keep the variances of each 2 x 2 block towards P and across, in the new axes.
+    # Keep the variances of each 2 x 2 block toward P and across, in the new axes.
     outer, outer_across = np.outer(new, new), np.outer(across, across)
     for i in range(2):
         for j in range(2):
@@ -152,9 +152,9 @@ def _turn_surface(
             # A position along the surface says nothing about the middle of the hits.
             if i == 0 and j == 0:
                 aside = _ANYWHERE_M**2
-            towards = np.sum(part * np.outer(old, old))
+            toward = np.sum(part * np.outer(old, old))
             p[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = (
-                towards * outer + aside * outer_across
+                toward * outer + aside * outer_across
             )
     state[0], state[1] = p_WP[0] + far * along[0], p_WP[1] + far * along[1]
     # Reduce the velocity along the surface.

@@ -55,8 +55,8 @@ class ArrayShape:
     """(d,) unit vector perpendicular to the row or plane of microphones. It points to
     the side on which sources are reported. None if the array distinguishes both sides.
 
-    By default, the vector points towards +x for a row of microphones, or towards +y if
-    the row is along x. For a plane in space, it points towards +z. The rule for rows
+    By default, the vector points toward +x for a row of microphones, or toward +y if
+    the row is along x. For a plane in space, it points toward +z. The rule for rows
     also applies to an upright plane.
     """
     aperture_m: float
@@ -171,8 +171,8 @@ class ArrayShape:
         """Returns the same array, for sources that are all on one known side.
 
         Args:
-            side: ``ahead`` is towards +x, or towards +y for a row along x. ``above`` is
-                towards +z. ``behind`` and ``below`` are the opposite sides.
+            side: ``ahead`` is toward +x, or toward +y for a row along x. ``above`` is
+                toward +z. ``behind`` and ``below`` are the opposite sides.
 
         Returns:
             The shape that faces this side. Its ``ambiguity`` is ``none``.

@@ -181,7 +181,7 @@ def retarded_delays(
                     s, h, p_WS[n, 1], p_WS[n + 1, 1], v_WS[n, 1], v_WS[n + 1, 1]
                 )
                 dx, dy = p_WM[m, k, 0] - x, p_WM[m, k, 1] - y
-                # Newton step; ``away`` is the speed of the source towards the
+                # Newton step; ``away`` is the speed of the source toward the
                 # microphone.
                 r = max(math.sqrt(dx * dx + dy * dy), 1e-9)
                 away = (dx * vx + dy * vy) / r

@@ -37,7 +37,7 @@ _STEP, _LEAST_STEPS = 0.25, 60
 class RigidSphere:
     """A rigid sphere with n microphones on its surface, in a band of frequencies."""
 
-    towards: NDArray[np.float64]
+    toward: NDArray[np.float64]
     """(n, d) unit vectors from the center of the sphere to the microphones."""
     radius_m: float
     """Radius of the sphere, m."""
@@ -87,7 +87,7 @@ class RigidSphere:
         The (..., d) unit vectors point to the sources. The result has the shape
         (..., n).
         """
-        return self._bend(u @ self.towards.T) * self.radius_m / self.c
+        return self._bend(u @ self.toward.T) * self.radius_m / self.c
 
     def _bend(self, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
         angle = np.arccos(np.clip(cosine, -1.0, 1.0))

@@ -31,7 +31,7 @@ from systems.world.shapes import Shape
 #: Fields of ``ObstacleParameters`` by preset.
 _PRESETS: Mapping[str, Mapping[str, Any]] = {
     # Shoulders are 0.4 to 0.5 m wide (DIN 33402-2). Adults walk at 1.3 to 1.5 m/s if
-    # they choose the speed (Bohannon, Age and Ageing 26, 1997, table 3).
+    # they choose the speed (Bohannon, Age and Aging 26, 1997, table 3).
     "person": {"radius_m": 0.25, "speed_m_s": 1.3}
 }
 #: Fields that define the shape. An obstacle has exactly one of them.

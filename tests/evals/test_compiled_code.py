@@ -18,7 +18,7 @@ SCRIPT = """
 import hashlib
 import numpy as np
 from systems.sound.array_shape import ArrayShape
-from systems.hearing.localise import Localiser, TDOAParameters
+from systems.hearing.localize import Localizer, TDOAParameters
 from systems.framework.noise import frame_noise
 from systems.sound.propagation import propagate
 from systems.framework.signals import Emission
@@ -33,8 +33,8 @@ times = np.tile(0.1 + np.linspace(0.0, 0.025, 11), (3, 1))
 p_WM = np.tile(np.array(places)[:, None], (1, 11, 1))
 heard = propagate(emission, times, p_WM, np.zeros((3, 11, 2)), 2500, 340.0)
 frame = heard + np.float32(0.01) * frame_noise((3, 2500), 1, 2)
-localiser = Localiser(TDOAParameters(), ArrayShape.of(places), 340.0)
-fix, _ = localiser.localise(frame, localiser.blank())
+localizer = Localizer(TDOAParameters(), ArrayShape.of(places), 340.0)
+fix, _ = localizer.localize(frame, localizer.blank())
 digest = hashlib.sha256(heard.tobytes() + frame.tobytes())
 digest.update(fix.p_AS.tobytes() + fix.covariance.tobytes())
 print(digest.hexdigest())

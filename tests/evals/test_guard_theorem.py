@@ -265,19 +265,19 @@ def foreseen_way(speed: float = 0.72) -> float:
 
 
 def test_a5_the_plant_brakes_as_foreseen():
-    """Rolling wheels, and tyres that hold: 1.5 m/s^2 take a friction of 0.153."""
+    """Rolling wheels, and tires that hold: 1.5 m/s^2 take a friction of 0.153."""
     for friction in (None, 0.6, 0.17):
         assert braking_way(friction) == pytest.approx(foreseen_way(), abs=1e-3)
 
 
-def test_a5_broken_by_a_floor_on_which_tyres_do_not_hold():
+def test_a5_broken_by_a_floor_on_which_tires_do_not_hold():
     """With 0.1 it slides on: v^2/(2 mu g) instead of v^2/2a, and the lag."""
     assert braking_way(0.1) > foreseen_way() + 0.02
     assert braking_way(0.1) == pytest.approx(0.72**2 / (2.0 * 0.1 * 9.81), rel=0.2)
 
 
 @pytest.mark.slow
-def test_a5_broken_in_a_run_by_commands_that_tyres_cannot_obey():
+def test_a5_broken_in_a_run_by_commands_that_tires_cannot_obey():
     assert collides(4, {"plant": {"friction": 0.1}})
 
 

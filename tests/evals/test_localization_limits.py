@@ -1,4 +1,4 @@
-"""Localisation at its limits: the Cramer-Rao bound, and the array's tolerances."""
+"""Localization at its limits: the Cramer-Rao bound, and the array's tolerances."""
 
 from __future__ import annotations
 

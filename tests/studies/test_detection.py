@@ -14,7 +14,7 @@ from systems.base.robot import RobotParameters
 from systems.delays.delays import look
 from systems.delays.half_band import halve_rate
 from systems.framework.noise import tick_generator
-from systems.hearing.localise import Localiser
+from systems.hearing.localize import Localizer
 from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
@@ -44,13 +44,13 @@ def test_false_alarms_are_counted_at_every_rate_by_itself():
 def test_a_chance_is_a_false_alarm_of_every_rate_above_it():
     """Something is heard in a first frame if and only if its rate is higher."""
     noise = tick_generator(9, 3).standard_normal((3, 2500), dtype=np.float32)
-    default = Localiser(TDOAParameters(), SHAPE, C)
+    default = Localizer(TDOAParameters(), SHAPE, C)
     seen = look(halve_rate(noise), default.plan)
     assert seen is not None
     for factor, heard in ((1.01, True), (0.99, False)):
         rate = factor * seen[0].chance
-        localiser = Localiser(TDOAParameters(false_alarm_rate=rate), SHAPE, C)
-        _, memory = localiser.localise(noise, localiser.blank())
+        localizer = Localizer(TDOAParameters(false_alarm_rate=rate), SHAPE, C)
+        _, memory = localizer.localize(noise, localizer.blank())
         # What is noise leaves its level behind.
         assert (memory.energy == 0.0) == heard
 
@@ -66,9 +66,9 @@ def test_what_is_off_by_more_than_it_says_is_wrong(monkeypatch):
     """An estimator that takes sound for 15 % faster: sin(bearing) is 1.15 times it."""
 
     def mistaken(parameters, shape, c):
-        return Localiser(parameters, shape, 1.15 * c)
+        return Localizer(parameters, shape, 1.15 * c)
 
-    monkeypatch.setattr(detection, "Localiser", mistaken)
+    monkeypatch.setattr(detection, "Localizer", mistaken)
     (point,) = curve([20.0], 25, range_m=20.0)
     bearings = [
         abs(tick_generator(2, trial).uniform(-math.pi / 3.0, math.pi / 3.0))
@@ -108,11 +108,11 @@ def test_frames_of_a_made_up_estimator_are_counted(monkeypatch):
         def blank(self):
             return None
 
-        def localise(self, frame, _):
+        def localize(self, frame, _):
             heard.append(frame)
             return next(self.answers), None
 
-    monkeypatch.setattr(detection, "Localiser", MadeUp)
+    monkeypatch.setattr(detection, "Localizer", MadeUp)
     (point,) = curve([20.0], 6, range_m=4.0)
     assert (point.heard, point.ranged) == (5, 2)
     assert point.wrong == sum(wrong for *_, wrong in ANSWERS)

@@ -69,7 +69,7 @@ class PlaneFits(NamedTuple):
     """
 
     azimuth: NDArray[np.float64]
-    """(m,) azimuths from +x towards +y, rad."""
+    """(m,) azimuths from +x toward +y, rad."""
     elevation: NDArray[np.float64]
     """(m,) elevations, rad. NaN if the array cannot measure them."""
     fits: NDArray[np.bool_]

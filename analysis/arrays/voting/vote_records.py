@@ -19,7 +19,7 @@ class DirectionVotes(NamedTuple):
     t_s: NDArray[np.float64]
     """(k,) middles of the groups of the votes, s from the first sample."""
     azimuth: NDArray[np.float64]
-    """(k,) azimuths from +x towards +y, in (-pi, pi], rad. They are on the side of
+    """(k,) azimuths from +x toward +y, in (-pi, pi], rad. They are on the side of
     ``shape.ahead``."""
     elevation: NDArray[np.float64]
     """(k,) elevations above the x-y plane, rad. NaN if the array cannot measure them.

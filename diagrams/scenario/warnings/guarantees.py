@@ -16,7 +16,7 @@ from diagrams.scenario.bodies import Body
 from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.warnings.corner_speeds import corner_speeds
 from systems.base.robot import body_radius
-from systems.base.tyre_grip import GRAVITY_M_S2
+from systems.base.tire_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError, shortened
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M

@@ -56,7 +56,7 @@ def _recorded(
     array: str, sound: str, at: tuple[float, float], seed: int
 ) -> tuple[NDArray[np.float64], float]:
     rng = np.random.default_rng([40, seed])
-    towards, radius = _ARRAYS[array]
+    toward, radius = _ARRAYS[array]
     rate = 48_000.0 if sound == "bursts" else 16_000.0
     if sound == "speech":
         emitted = speech_like(rng, _SECONDS, rate)
@@ -73,17 +73,17 @@ def _recorded(
         ]
     )
     heard = sphere_recording(
-        towards, radius, u, emitted, rate, c=_C, snr_db=30.0, rng=rng
+        toward, radius, u, emitted, rate, c=_C, snr_db=30.0, rng=rng
     )
     return heard, rate
 
 
 def _judge(array: str, sound: str, at: tuple[float, float], seed: int) -> Outcome:
     heard, rate = _recorded(array, sound, at, seed)
-    towards, radius = _ARRAYS[array]
+    toward, radius = _ARRAYS[array]
     geometry = ArrayGeometry.model_validate(
         {
-            "microphones": (radius * towards).tolist(),
+            "microphones": (radius * toward).tolist(),
             "temperature_c": 20.0,
             "body": {"sphere_m": radius},
         }
@@ -116,9 +116,9 @@ def _judge_unstated(array: str, seed: int) -> Outcome:
     """Judges an answer without the sphere; right, too, is a remedy that names it."""
     at = _PLACES_DEG[0]
     heard, rate = _recorded(array, "speech", at, seed + 50)
-    towards, radius = _ARRAYS[array]
+    toward, radius = _ARRAYS[array]
     try:
-        found = locate(heard, (radius * towards).tolist(), sample_rate_hz=rate)
+        found = locate(heard, (radius * toward).tolist(), sample_rate_hz=rate)
     except InputError as error:
         return Outcome(right="body" in str(error), said=str(error))
     told = found.main_source()

@@ -18,7 +18,7 @@ from systems.laws.parameters import AttractionParameters
 from systems.laws.reciprocal_avoidance import ReciprocalAvoidanceParameters
 from systems.planning.following import CRUISE_SPEED_M_S, FollowNumbers, approach
 from systems.planning.half_planes import nearest_velocity
-from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
+from systems.planning.turning import TURN_RATE_RAD_S, turn_toward, wrapped
 
 # ``_CLEARANCE_M``: distance that the robot keeps from all bodies, m.
 # ``_FARTHEST_M``: distance beyond which bodies do not count, m.
@@ -221,7 +221,7 @@ def reciprocal_avoidance_step(
     changed = math.hypot(vx - preferred[0], vy - preferred[1])
     backs = wanted < 0.0 and changed < _UNCHANGED_M_S
     if inputs[2][0] > 0.5 and (backs or math.hypot(vx, vy) < _RESTS_M_S):
-        twist[1] = turn_towards(0.0, bearing, pose[2])[1]
+        twist[1] = turn_toward(0.0, bearing, pose[2])[1]
 
 
 class ReciprocalAvoidanceController(BaselineController):

@@ -13,7 +13,7 @@ from systems.laws.baselines.baseline_controller import BaselineController
 from systems.laws.parameters import AttractionParameters
 from systems.laws.stop_when_near import StopWhenNearParameters
 from systems.planning.following import FollowNumbers, approach
-from systems.planning.turning import turn_towards
+from systems.planning.turning import turn_toward
 from systems.ranging.parameters import UltrasonicParameters
 
 
@@ -35,7 +35,7 @@ def stop_when_near_step(
     for k in range(len(ranges)):
         if echo[k] > 0.5 and ranges[k] < own.stop_m:
             wanted = min(wanted, 0.0)
-    twist[0], twist[1] = turn_towards(wanted, bearing, inputs[3][2])
+    twist[0], twist[1] = turn_toward(wanted, bearing, inputs[3][2])
 
 
 class StopWhenNearController(BaselineController):

@@ -23,7 +23,7 @@ from systems.laws.parameters import AttractionParameters
 from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.body_contact import in_body_axes, time_to_contact
 from systems.planning.following import FollowNumbers, approach, left_to_target
-from systems.planning.turning import TURN_RATE_RAD_S, turn_towards, wrapped
+from systems.planning.turning import TURN_RATE_RAD_S, turn_toward, wrapped
 
 # ``_SECTORS``: number of sectors of the histogram (5 deg each, as in the paper).
 # ``_WIDE``: largest number of sectors of a narrow valley.
@@ -318,7 +318,7 @@ def vector_field_histogram_step(
         wanted, direction = min(wanted, 0.0), bearing
     elif wanted > 0.0:
         wanted *= max(1.0 - density / own.slow_density, 0.0)
-    motion = turn_towards(wanted, direction, pose[2])
+    motion = turn_toward(wanted, direction, pose[2])
     twist[0], twist[1] = _off_target(motion, of_target, at, numbers.half_size)
     memory[_SECTORS + 1] = twist[0]
     for k in range(len(memory)):

@@ -24,10 +24,10 @@ TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / mat
 )
 
 
-def on_sphere(towards, radius, **fields):
+def on_sphere(toward, radius, **fields):
     return ArrayGeometry.model_validate(
         {
-            "microphones": (radius * towards).tolist(),
+            "microphones": (radius * toward).tolist(),
             "sound_speed": C,
             "body": {"sphere_m": radius},
             **fields,
@@ -43,10 +43,10 @@ def unit(bearing_deg, elevation_deg):
     )
 
 
-def heard(towards, radius, at, seed, seconds=1.5):
+def heard(toward, radius, at, seed, seconds=1.5):
     rng = np.random.default_rng(seed)
     return sphere_recording(
-        towards,
+        toward,
         radius,
         unit(*at),
         speech_like(rng, seconds, RATE),
@@ -58,7 +58,7 @@ def heard(towards, radius, at, seed, seconds=1.5):
 
 
 @pytest.mark.parametrize(
-    ("towards", "radius", "at"),
+    ("toward", "radius", "at"),
     [
         (TETRAHEDRON, 0.042, (-130.0, 25.0)),
         (spiral_sphere(8), 0.042, (78.0, -14.0)),
@@ -66,9 +66,9 @@ def heard(towards, radius, at, seed, seconds=1.5):
     ],
     ids=["4 on 4.2 cm", "8 on 4.2 cm", "8 on 9 cm"],
 )
-def test_a_talker_around_a_sphere(towards, radius, at):
+def test_a_talker_around_a_sphere(toward, radius, at):
     found = locate(
-        heard(towards, radius, at, 5), on_sphere(towards, radius), sample_rate_hz=RATE
+        heard(toward, radius, at, 5), on_sphere(toward, radius), sample_rate_hz=RATE
     )
     told = found.main_source()
     assert not found.faults
@@ -89,10 +89,10 @@ def test_without_the_sphere_the_message_names_it():
 
 def test_delays_on_a_sphere_give_the_direction():
     """Pure tones below the band's middle: their phase delays, from the series."""
-    towards, radius = spiral_sphere(12), 0.05
-    geometry = on_sphere(towards, radius, band=[300.0, 1000.0])
+    toward, radius = spiral_sphere(12), 0.05
+    geometry = on_sphere(toward, radius, band=[300.0, 1000.0])
     for at in ((10.0, 0.0), (140.0, 35.0), (-75.0, -50.0)):
-        angle = np.arccos(towards @ unit(*at))
+        angle = np.arccos(toward @ unit(*at))
         ka = 2.0 * math.pi * 600.0 * radius / C
         phase = np.angle(surface_pressure(np.array([ka]), angle))[0]
         arrival = phase / (2.0 * math.pi * 600.0)

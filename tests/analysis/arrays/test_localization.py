@@ -1,4 +1,4 @@
-"""The papers' localisation experiment: what is heard, counted and written."""
+"""The papers' localization experiment: what is heard, counted and written."""
 
 from __future__ import annotations
 

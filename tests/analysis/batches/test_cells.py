@@ -14,7 +14,7 @@ from analysis.batches.cells import Cell, make_cell
 NAN = math.nan
 
 
-def summarised(fields: dict[str, Any] | None = None, **columns: Any) -> Cell:
+def summarized(fields: dict[str, Any] | None = None, **columns: Any) -> Cell:
     table = {"index": [10 * k for k in range(len(columns["cause"]))], **columns}
     rows = pd.DataFrame({"collision_fault": None, **table})
     return make_cell("here", fields or {"law": "active"}, rows, 1)
@@ -23,14 +23,14 @@ def summarised(fields: dict[str, Any] | None = None, **columns: Any) -> Cell:
 def test_fields_of_the_grid_set_a_cell_apart():
     # As a plan's file has them: no string of the code itself.
     fields = json.loads('{"robot.width_m": 0.41, "law": "none", "hearing": "ideal"}')
-    cell = summarised(fields, cause=["reached"])
+    cell = summarized(fields, cause=["reached"])
     assert (cell.scenario, cell.fields, cell.runs) == ("here", fields, 1)
     assert cell.label == "width_m 0.41, law none, hearing ideal"
 
 
 def test_figures_of_successes_leave_out_runs_that_failed_or_have_none():
     """Jerk of runs 0 and 4; clearance of 0, 1, 2 and 4."""
-    cell = summarised(
+    cell = summarized(
         cause=["completed", "stuck", "collision", "failed", "reached"],
         jerk_rms_m_s3=[2.0, 90.0, 90.0, 90.0, 5.0],
         sparc=[NAN, -9.0, -9.0, -9.0, -2.0],
@@ -51,16 +51,16 @@ def test_figures_of_successes_leave_out_runs_that_failed_or_have_none():
 
 
 def test_spl_leaves_out_runs_without_a_shortest_way():
-    cell = summarised(cause=["reached"] * 3, spl=[0.5, NAN, 1.0])
+    cell = summarized(cause=["reached"] * 3, spl=[0.5, NAN, 1.0])
     # Two values: each end is drawn twice in a quarter of the resamples.
     spl = cell.metrics["spl"]
     assert (spl.value, spl.low, spl.high, spl.n) == (0.75, 0.5, 1.0, 2)
-    assert "spl" not in summarised(cause=["reached"]).metrics
-    assert "spl" not in summarised(cause=["reached"], spl=[NAN]).metrics
+    assert "spl" not in summarized(cause=["reached"]).metrics
+    assert "spl" not in summarized(cause=["reached"], spl=[NAN]).metrics
 
 
 def test_causes_are_counted_in_the_order_of_their_names():
-    cell = summarised(
+    cell = summarized(
         cause=["stuck", "collision", "reached", "collision", "stuck", "collision"],
         collision_fault=["robot", "robot", None, "obstacle", None, "robot"],
     )
@@ -74,7 +74,7 @@ def test_causes_are_counted_in_the_order_of_their_names():
 
 def test_mechanisms_are_counted_commonest_first():
     """Warned for 0.5 s: late; never: not heard; none of what cannot have cones."""
-    cell = summarised(
+    cell = summarized(
         cause=["reached", "collision", "lost", "collision", "collision"],
         tick_s=[0.025] * 5,
         contact_warning_s=[NAN, 0.5, NAN, NAN, 0.25],
@@ -83,12 +83,12 @@ def test_mechanisms_are_counted_commonest_first():
     )
     assert cell.mechanisms == {"late echo": 2, "lost": 1, "no echo": 1}
     assert next(iter(cell.mechanisms)) == "late echo"
-    assert summarised(cause=["collision"]).mechanisms == {}
+    assert summarized(cause=["collision"]).mechanisms == {}
 
 
 def test_rates_of_a_cell_are_of_all_its_runs():
     """1 of 4: Wilson's interval 0.0456 to 0.6994 (z = 1.96, from its formula)."""
-    cell = summarised(cause=["completed", "collision", "failed", "lost"])
+    cell = summarized(cause=["completed", "collision", "failed", "lost"])
     for rate in (cell.success, cell.collision):
         assert (rate.value, rate.low, rate.high) == pytest.approx(
             (0.25, 0.0456, 0.6994), abs=5e-5
@@ -97,7 +97,7 @@ def test_rates_of_a_cell_are_of_all_its_runs():
 
 def test_examples_are_failures_first_and_the_middle_is_the_upper_one():
     """Failures 0.4 and 0.5 m clear, successes 0.1 and 0.2: in this order."""
-    cell = summarised(
+    cell = summarized(
         cause=["reached", "stuck", "completed", "failed", "lost"],
         minimum_clearance_m=[0.2, 0.5, 0.1, NAN, 0.4],
     )
@@ -109,7 +109,7 @@ def test_examples_are_failures_first_and_the_middle_is_the_upper_one():
 
 
 def test_one_run_is_every_example_and_none_is_no_example():
-    cell = summarised(cause=["failed", "stuck"], minimum_clearance_m=[NAN, 0.5])
+    cell = summarized(cause=["failed", "stuck"], minimum_clearance_m=[NAN, 0.5])
     assert [e.index for e in cell.examples] == [10, 10, 10]
-    assert summarised(cause=["failed"], minimum_clearance_m=[NAN]).examples == ()
-    assert summarised(cause=["failed"]).examples == ()
+    assert summarized(cause=["failed"], minimum_clearance_m=[NAN]).examples == ()
+    assert summarized(cause=["failed"]).examples == ()

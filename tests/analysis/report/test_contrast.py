@@ -77,7 +77,7 @@ def contrast(color: Any, scheme: str = "light", behind: Any = "white") -> float:
 
 
 def test_ratios_are_those_of_the_standard() -> None:
-    """Black on white is 21; #767676 is the lightest grey that does for words."""
+    """Black on white is 21; #767676 is the lightest gray that does for words."""
     assert contrast("black") == pytest.approx(21.0)
     assert contrast("#767676") >= 4.5 > contrast("#777777")
     assert palette.contrast("#767676", "white") == pytest.approx(contrast("#767676"))
@@ -122,7 +122,7 @@ def seen(color: str, cones: Any) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("cones", [np.eye(3), NO_GREEN, NO_RED])
 def test_what_stands_side_by_side_is_told_apart_by_any_eyes(cones: Any) -> None:
-    """A difference of 2.3 is just noticed; Okabe and Ito's own with a grey has 7.1."""
+    """A difference of 2.3 is just noticed; Okabe and Ito's own with a gray has 7.1."""
     names = [
         ("source", "echo"),
         ("left", "right"),

@@ -123,7 +123,7 @@ def test_bodies_that_are_passed_over_are_not_the_nearest(seed):
 
 
 def test_time_to_contact_counts_both_motions():
-    """Towards each other at 0.5 and 0.3 m/s."""
+    """Toward each other at 0.5 and 0.3 m/s."""
     cart = {
         "name": "cart",
         "size_m": [0.2, 0.1],

@@ -62,7 +62,7 @@ def test_a_corner_is_turned_to_a_goal_by_the_true_pose():
 
 @pytest.mark.slow
 def test_a_swinging_driver_visits_a_box_and_comes_back_to_it():
-    """It comes near the box twice and turns corners of the body towards it."""
+    """It comes near the box twice and turns corners of the body toward it."""
     box = 0.0, -1.63, 0.0, 0.3, 0.3
     names = "box", "swing", "plain"
     result = run_result(swing_at_boxes(names, [box], BY_HAND, 60.0, swings=1))

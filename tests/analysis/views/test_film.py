@@ -24,7 +24,7 @@ from systems.framework.input_error import InputError
 
 
 def _pictures(count: int = 8) -> list[np.ndarray]:
-    """Grey that grows lighter, with an odd number of rows."""
+    """Gray that grows lighter, with an odd number of rows."""
     return [np.full((31, 40, 3), 10 * k, dtype=np.uint8) for k in range(count)]
 
 

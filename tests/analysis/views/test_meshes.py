@@ -34,7 +34,7 @@ def test_rectangles_are_covered_once():
     assert area(rectangles(edges, 0.1)) == pytest.approx(1.0 + 2.0)
 
 
-def test_an_arrow_ends_one_metre_ahead_and_a_star_has_five_tips():
+def test_an_arrow_ends_one_meter_ahead_and_a_star_has_five_tips():
     tip = arrow().vertices[:, arrow().vertices[0].argmax()]
     assert tip == pytest.approx([1.0, 0.0, 0.0])
     middle = star(0.2, 0.0, 1e-6).vertices[:2, :10]

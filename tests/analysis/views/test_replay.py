@@ -171,7 +171,7 @@ def _angles(run):
     return wheel_angles(run.scenario.only.robot, run.poses("WB"))
 
 
-def test_wheels_that_roll_a_metre_turn_by_a_metre_over_their_radius(ideal_run):
+def test_wheels_that_roll_a_meter_turn_by_a_meter_over_their_radius(ideal_run):
     part = np.linspace(0.0, 1.0, len(ideal_run.time))
     heading = np.full_like(part, 0.7)
     straight = _driven(ideal_run, part * math.cos(0.7), part * math.sin(0.7), heading)

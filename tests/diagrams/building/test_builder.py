@@ -292,7 +292,7 @@ def test_from_an_echo_to_the_wheels_is_no_tick(obstacle_sensing):
 
 
 def test_an_ideal_estimate_is_placed_by_the_pose_of_its_moment():
-    """A resting source stays put while the robot turns towards it."""
+    """A resting source stays put while the robot turns toward it."""
     source = {"waypoints_m": [[0.6, 2.5]]}
     follower = build(source=source, law="none")
     simulator = make_simulator(follower)

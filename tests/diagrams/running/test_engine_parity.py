@@ -60,7 +60,7 @@ OBJECTS = {
     "objects.velocity_noise_m_s": 0.05,
     "objects.latency_s": 0.05,
 }
-#: Two robots that drive towards each other and past, 0.9 m wide each.
+#: Two robots that drive toward each other and past, 0.9 m wide each.
 MEETING: dict[str, Any] = {
     "robots": {
         "near": {"start": {"position_m": [0.0, 0.0]}},

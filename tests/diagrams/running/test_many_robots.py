@@ -105,7 +105,7 @@ def test_a_robot_is_seen_by_another():
         duration_s=0.2,
     )
     a = result.robots["a"]
-    # Turned by a quarter, b shows its broad side: half its width is towards a.
+    # Turned by a quarter, b shows its broad side: half its width is toward a.
     assert a.columns["range_2"] == pytest.approx(2.0 - 0.175 - 0.41)
     assert set(a.surroundings.bodies) == {"b", "source"}
 

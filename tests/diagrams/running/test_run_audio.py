@@ -161,7 +161,7 @@ def test_robots_and_loudspeakers_have_files_by_name(tmp_path, engine):
 
 
 def test_locate_finds_a_source_at_rest(tmp_path):
-    """The same signal through the general localiser: the truth is the simulation's."""
+    """The same signal through the general localizer: the truth is the simulation's."""
     places = "start.position_m=[0,0]", "source.waypoints_m=[[1.9,1.1]]"
     result, _ = saved(tmp_path, "drake", "obstacle_free", "duration_s=0.6", *places)
     geometry = load_geometry(tmp_path / "array.yaml")

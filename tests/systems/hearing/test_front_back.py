@@ -67,7 +67,7 @@ def turning(source, rate: float, seconds: float):
 
 
 def starting(source, seconds: float, burst_s: float = 0.5):
-    """A robot that accelerates along x as towards an image 2.5 m ahead."""
+    """A robot that accelerates along x as toward an image 2.5 m ahead."""
     frames = []
     for k in range(round(seconds / T)):
         time = k * T
@@ -104,7 +104,7 @@ def test_the_image_of_a_resting_source_runs_when_the_robot_turns(direction_deg):
 @pytest.mark.parametrize("ranged", [True, False])
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("bearing_deg", [180.0, 150.0, -120.0])
-def test_a_start_towards_the_image_tells_within_two_bursts(bearing_deg, seed, ranged):
+def test_a_start_toward_the_image_tells_within_two_bursts(bearing_deg, seed, ranged):
     """Noisy frames, 0.5 s in every 2 s, while the robot drives the wrong way."""
     bearing = math.radians(bearing_deg)
     source = [2.5 * math.cos(bearing), 2.5 * math.sin(bearing)]

@@ -164,7 +164,7 @@ def test_a_range_that_is_hardly_known_is_that_of_least_squares_too():
 
 @cases
 def test_stated_errors_are_the_actual_ones(name):
-    """Normalised squares of the errors, and of the residuals, over 300 trials."""
+    """Normalized squares of the errors, and of the residuals, over 300 trials."""
     shape, p_AS = case(name)
     generator = np.random.default_rng(6)
     covariance = noise_of(shape.count, 2e-7)

@@ -11,7 +11,7 @@ from numpy.random import Generator, Philox
 from diagrams import load_scenario, simulate
 from phonotaxis.testing import Bench
 from systems.framework.signals import AudioFrame
-from systems.hearing import localise
+from systems.hearing import localize
 from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import (
     NO_PLACE,
@@ -105,7 +105,7 @@ def test_delays_that_no_place_has():
 
 
 def test_a_range_that_is_too_uncertain(monkeypatch):
-    monkeypatch.setattr(localise, "_LARGEST_RANGE_STD", 1e-5)
+    monkeypatch.setattr(localize, "_LARGEST_RANGE_STD", 1e-5)
     assert Ears().hear(sound_at(1.5, 0.5)) == UNCERTAIN
 
 
@@ -115,7 +115,7 @@ def test_a_source_too_near_is_rejected():
 
 
 def test_an_estimate_too_uncertain_is_rejected(monkeypatch):
-    monkeypatch.setattr(localise, "_LARGEST_BEARING_STD", 1e-8)
+    monkeypatch.setattr(localize, "_LARGEST_BEARING_STD", 1e-8)
     assert Ears().hear(sound_at(1.5, 0.5)) == REJECTED
 
 

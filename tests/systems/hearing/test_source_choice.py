@@ -17,7 +17,7 @@ from systems.hearing.source_choice import Belief
 from systems.hearing.tdoa_estimator import (
     TDOAEstimator,
     robot_choice,
-    robot_localiser,
+    robot_localizer,
 )
 from systems.hearing.tracking.target_filter import NEVER_HEARD_S
 from systems.sound.acoustics import SOUND_SPEED_M_S
@@ -76,18 +76,18 @@ def believed(p_PS, std=0.3, age=1.5, pose=AT_REST):
 
 
 class Ear:
-    """Localiser and choice of the default robot, with their memories."""
+    """Localizer and choice of the default robot, with their memories."""
 
     def __init__(self, first_bearing_deg=None):
         parameters = TDOAParameters(
             choose="followed", first_bearing_deg=first_bearing_deg
         )
-        self.localiser, p_PA = robot_localiser(parameters, ROBOT, SOUND_SPEED_M_S)
-        self.choice = robot_choice(self.localiser, ROBOT, p_PA, FRAME_S)
-        self.hearing, self.memory = self.localiser.blank(), self.choice.blank()
+        self.localizer, p_PA = robot_localizer(parameters, ROBOT, SOUND_SPEED_M_S)
+        self.choice = robot_choice(self.localizer, ROBOT, p_PA, FRAME_S)
+        self.hearing, self.memory = self.localizer.blank(), self.choice.blank()
 
     def listen(self, counts, belief, **options):
-        found, self.hearing = self.localiser.candidates(counts, self.hearing)
+        found, self.hearing = self.localizer.candidates(counts, self.hearing)
         best, self.memory = self.choice.choose(found, self.memory, belief, **options)
         return None if best is None else found[best].fix
 
@@ -106,7 +106,7 @@ NOTHING_YET = Belief(np.zeros(2), np.zeros((2, 2)), NEVER_HEARD_S, AT_REST)
 @pytest.mark.parametrize("level", [0.5, 1.0, 2.0])
 def test_each_sound_has_its_delays(level):
     """Of both within five of their stated deviations; 6 dB below, chance hides some."""
-    plan, found = Ear().localiser.plan, []
+    plan, found = Ear().localizer.plan, []
     for frame in range(5):
         counts = halve_rate(heard(frame, levels=(1.0, level)))
         seen = look(counts, plan)

@@ -14,7 +14,7 @@ from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise
 from systems.framework.signals import AudioFrame
 from systems.hearing.parameters import TDOAParameters
-from systems.hearing.tdoa_estimator import TDOAEstimator, robot_localiser
+from systems.hearing.tdoa_estimator import TDOAEstimator, robot_localizer
 from systems.sound.acoustics import SOUND_SPEED_M_S
 from systems.sound.adc import convert
 from systems.sound.parameters import MicArrayParameters
@@ -26,12 +26,12 @@ PLACES = np.array([[0.0, L], [0.0, 0.0], [0.0, -L]])
 DEFAULT = TDOAParameters()
 
 
-def localise(frame, parameters=DEFAULT, *, limited=True):
+def localize(frame, parameters=DEFAULT, *, limited=True):
     """What a frame says to one who has heard nothing before."""
-    localiser, _ = robot_localiser(
+    localizer, _ = robot_localizer(
         parameters, RobotParameters(), SOUND_SPEED_M_S, limited=limited
     )
-    return localiser.localise(frame, localiser.blank())[0]
+    return localizer.localize(frame, localizer.blank())[0]
 
 
 def chirp(t):
@@ -58,7 +58,7 @@ def heard(sound, bearing_deg, distance, snr_db, seed=0):
 
 
 def found_in(frame, parameters=DEFAULT):
-    fix = localise(frame, parameters)
+    fix = localize(frame, parameters)
     assert fix is not None
     return fix
 
@@ -128,7 +128,7 @@ def test_noise_is_not_heard(method, seconds):
     for tick in range(40 * seconds):
         counts = convert(None, frame_noise((3, N), 11, tick), 0.003, microphones)
         frame = counts.astype(np.float32)
-        assert localise(frame, parameters) is None
+        assert localize(frame, parameters) is None
 
 
 def errors_of_tones(tone_hz, *, limited=True, **fields):
@@ -147,7 +147,7 @@ def errors_of_tones(tone_hz, *, limited=True, **fields):
             noise = Generator(Philox(key=seed)).standard_normal((3, N))
             frame = arriving(burst, bearing, 2.0) + 0.01 * noise
             parameters = TDOAParameters(**fields)
-            fix = localise(frame.astype(np.float32), parameters, limited=limited)
+            fix = localize(frame.astype(np.float32), parameters, limited=limited)
             if fix is not None:
                 error = abs(fix.bearing - math.radians(bearing))
                 errors.append(error / (5.0 * fix.bearing_std + 0.01))

@@ -36,11 +36,11 @@ def test_attraction_as_printed():
 def test_attraction_rests_at_the_follow_distance(direction, distance):
     """At rest: pull outside of d_f, none at d_f, push inside."""
     attraction = AttractionParameters(follow_distance_m=1.2, stiffness_n_m=2.0)
-    towards = np.array([math.cos(direction), math.sin(direction)])
+    toward = np.array([math.cos(direction), math.sin(direction)])
     p_WS = np.array([0.4, -0.7])
-    p_WP = p_WS - distance * towards
+    p_WP = p_WS - distance * toward
     force = attraction_force(p_WP, (0.0, 0.0), p_WS, True, attraction, 3.94)
-    np.testing.assert_allclose(force, 2.0 * (distance - 1.2) * towards, atol=1e-9)
+    np.testing.assert_allclose(force, 2.0 * (distance - 1.2) * toward, atol=1e-9)
 
 
 def test_without_a_target_the_mass_brakes_with_its_time_constant():

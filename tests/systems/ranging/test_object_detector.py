@@ -192,7 +192,7 @@ def test_the_velocity_of_a_box_that_crosses_ahead(count, most):
 
 
 def test_what_comes_straight_at_it_is_timed_well_by_any_ring():
-    """Towards P a range tells the speed: within 2 % where the beams' number is even."""
+    """Toward P a range tells the speed: within 2 % where the beams' number is even."""
     for count in (72, 360):
         driven = Driven(ring(count))
         for tick in range(41):
@@ -231,7 +231,7 @@ def test_what_rests_rests_while_the_robot_moves(count, most):
 def test_a_wall_rests_however_the_noise_of_beams_moves_its_nearest_point():
     """1 cm at 0.5 m: from beam to beam the nearest one is another, by 10 deg and more.
 
-    What is known of such a wall towards P alone is good to noise/sqrt(ticks).
+    What is known of such a wall toward P alone is good to noise/sqrt(ticks).
     """
     noise = np.random.default_rng(1)
     sensors, rectangles = ring(72), np.array([[0.55, 0.0, 0.0, 0.1, 1.4, 0.0]])

@@ -71,12 +71,12 @@ def approach(
     )
     held = firing == "sequential" or period > T
     updated = [controller, collision, array] if held else [controller]
-    towards = np.array([math.cos(heading), math.sin(heading)])
+    toward = np.array([math.cos(heading), math.sin(heading)])
     speeds, vectors = [], []
     for tick in range(ticks):
-        pose = [*(robot * tick * T * towards), heading]
+        pose = [*(robot * tick * T * toward), heading]
         ahead = 0.175 + start + 0.5 - wall * tick * T
-        array.set(pose_WB=pose, poses_WO=[*(ahead * towards), heading])
+        array.set(pose_WB=pose, poses_WO=[*(ahead * toward), heading])
         names = ("ranges", "echo", "range_ages")
         collision.set(pose_WB_estimated=pose, **{n: array.output(n) for n in names})
         seen = {n: collision.output(n) for n in ("collision_vectors_B", "features")}

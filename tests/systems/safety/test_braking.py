@@ -247,7 +247,7 @@ def test_the_three_zones(beyond_keep, way, may):
     assert can_be_braked(*args) == may
 
 
-def test_away_from_one_cell_it_may_not_go_towards_another():
+def test_away_from_one_cell_it_may_not_go_toward_another():
     """What is forgotten beside it is no leave to drive to what is ahead."""
     behind, ahead = (-0.45, -0.02), (0.43, -0.02)
     here, rest, wish = (0.0, 0.0, 0.0), (0.0, 0.0), straight(0.03)

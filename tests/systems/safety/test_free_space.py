@@ -171,8 +171,8 @@ def test_a_cell_whose_whole_round_is_seen_from_one_place_is_free(name):
             if distance < 2.0 * half + 1e-6 or distance > 3.1:
                 continue
             hides = math.asin(half / distance) * (1.0 + 1e-6)
-            towards = middle - sensor
-            bearing = np.linspace(-hides, hides, 15) + math.atan2(*towards[::-1])
+            toward = middle - sensor
+            bearing = np.linspace(-hides, hides, 15) + math.atan2(*toward[::-1])
             round_ = sensor + (distance + half + 1e-5) * np.column_stack(
                 [np.cos(bearing), np.sin(bearing)]
             )

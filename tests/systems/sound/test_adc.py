@@ -49,7 +49,7 @@ def test_limits_follow_the_resolution(bits):
     np.testing.assert_array_equal(counts, [[2 ** (bits - 1) - 1, -(2 ** (bits - 1))]])
 
 
-def test_quantisation_noise_is_a_twelfth():
+def test_quantization_noise_is_a_twelfth():
     """Of a count squared, for a loud tone (Bennett)."""
     parameters = MicArrayParameters()
     exact = 500.0 * np.sin(0.7310 * np.arange(2500))[None]

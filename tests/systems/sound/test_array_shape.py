@@ -47,7 +47,7 @@ def test_kinds(places, kind, ambiguity, angles, freedom):
 
 
 @given(st.floats(-math.pi, math.pi), st.permutations(range(4)))
-def test_ahead_of_a_row_is_towards_x_whatever_the_order(angle, order):
+def test_ahead_of_a_row_is_toward_x_whatever_the_order(angle, order):
     u = np.array([math.cos(angle), math.sin(angle)])
     shape = ArrayShape.of(np.outer([-1.0, 0.2, 0.5, 1.0], u)[list(order)])
     assert shape.ahead is not None
@@ -57,7 +57,7 @@ def test_ahead_of_a_row_is_towards_x_whatever_the_order(angle, order):
     assert left == pytest.approx([-ahead[1], ahead[0]], abs=1e-9)
 
 
-def test_row_along_x_looks_towards_y():
+def test_row_along_x_looks_toward_y():
     shape = ArrayShape.of([[0.0, 0.0], [0.1, 0.0], [0.3, 0.0]])
     assert shape.ahead == pytest.approx([0.0, 1.0])
 

@@ -37,7 +37,7 @@ def played(noise, ticks):
     return np.concatenate([noise.frame(tick) for tick in range(1, ticks + 1)], 1)
 
 
-def test_level_is_below_the_source_at_one_metre(tmp_path):
+def test_level_is_below_the_source_at_one_meter(tmp_path):
     noise = ego_noise(recording(tmp_path / "fan.wav"), snr_db=20.0)
     rms = np.std(played(noise, 38))  # once through
     assert rms == pytest.approx(0.1, rel=0.02)

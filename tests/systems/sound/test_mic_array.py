@@ -167,7 +167,7 @@ def test_errors_of_a_context_shift_what_its_microphones_hear():
     )
 
 
-def test_noise_level_refers_to_one_metre():
+def test_noise_level_refers_to_one_meter():
     parameters = MicArrayParameters(snr_db_at_1m=20.0, adc_bits=16)
     audio = recorded(emission((5.0, 0.0), sounding=False), parameters=parameters)
     expected = 0.1 * 10 ** (-20 / 20) * parameters.counts_per_pa
@@ -186,7 +186,7 @@ def test_same_seed_same_counts():
 
 
 def test_robot_that_drives_shifts_the_tone():
-    """Han 2019, eq. 1: at 0.7 m/s towards the source, f (c + v) / c."""
+    """Han 2019, eq. 1: at 0.7 m/s toward the source, f (c + v) / c."""
     audio = recorded(
         emission((4.0, 0.0)),
         velocity=(0.7, 0.0, 0.0),

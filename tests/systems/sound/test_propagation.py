@@ -89,7 +89,7 @@ def test_static_source(tone):
 
 
 def analytic_delay(t, position, velocity, microphone):
-    """Travelling time from a uniformly moving source, the quadratic's root."""
+    """Traveling time from a uniformly moving source, the quadratic's root."""
     v = np.asarray(velocity)
     d = np.asarray(microphone) - (position + (t - TIME)[:, None] * v)
     dv = d @ v

@@ -56,8 +56,8 @@ def test_low_frequencies_are_later_by_half():
 def test_high_frequencies_creep_around_the_sphere():
     """Straight rays on the lit side, and the path along the surface behind it."""
     angle = np.radians([0.0, 40.0, 80.0, 110.0, 135.0])
-    towards = np.stack((np.cos(angle), np.sin(angle)), axis=1)
-    sphere = RigidSphere(towards, A, (60e3, 90e3), C)
+    toward = np.stack((np.cos(angle), np.sin(angle)), axis=1)
+    sphere = RigidSphere(toward, A, (60e3, 90e3), C)
     u = np.array([1.0, 0.0])
     arrival = sphere.later(u) * C / A - sphere.scale * np.cos(angle)
     expected = np.where(angle < math.pi / 2, -np.cos(angle), angle - math.pi / 2)

@@ -158,7 +158,7 @@ def moving_source(hold: str):
 
 @pytest.mark.parametrize("hold", HOLDS)
 def test_velocity_is_found_and_fades(hold):
-    """Towards 0 with 5 s; what was found within 1 s is some 2 % less than 0.3."""
+    """Toward 0 with 5 s; what was found within 1 s is some 2 % less than 0.3."""
     at = moving_source(hold)
     first = at.output("v_WS_estimated")
     np.testing.assert_allclose(first, [0.0, 0.3], atol=0.01)

@@ -174,7 +174,7 @@ def test_without_noise_the_track_is_at_the_sighting(x, y, dx, two):
 
 @given(st.floats(-3.0, 3.0), st.floats(-0.1, 0.1))
 def test_a_bearing_counts_across_itself_alone(direction, off):
-    """Against the information filter; nothing is learnt along the bearing."""
+    """Against the information filter; nothing is learned along the bearing."""
     memory = blank_memory(1)
     u = np.array([math.cos(direction), math.sin(direction)])
     n = np.array([-u[1], u[0]])
@@ -295,7 +295,7 @@ def test_the_gate_widens_with_silence():
 
 
 @pytest.mark.parametrize(("true_std", "stated_std"), [(0.08, 0.02), (0.02, 0.02)])
-def test_scatter_is_learnt_where_it_exceeds_what_is_stated(true_std, stated_std):
+def test_scatter_is_learned_where_it_exceeds_what_is_stated(true_std, stated_std):
     """A resting source: 5 s of frames that err by more than they say, or not.
 
     The factor finds 16 / 1.5, what is beyond the margin; honest frames leave it

@@ -31,9 +31,9 @@ def drawn(seed):
         far * math.sin(bearing),
         random.uniform(0.0, math.tau),
     )
-    # Some towards the body, some anywhere.
-    towards = np.array(relative[:2]) / far * random.uniform(0.3, 1.0)
-    velocity = towards * (seed % 2) + random.uniform(-0.5, 0.5, 2)
+    # Some toward the body, some anywhere.
+    toward = np.array(relative[:2]) / far * random.uniform(0.3, 1.0)
+    velocity = toward * (seed % 2) + random.uniform(-0.5, 0.5, 2)
     return relative, tuple(random.uniform(0.05, 0.5, 2)), tuple(velocity)
 
 

@@ -35,7 +35,7 @@ def test_sensitivities_are_those_of_the_motion(number, objects):
     expected = differences / (2.0 * step)
     at = 7 + 4 * number
     found = motion(value)[:, at : at + 4]
-    # A row has what was learnt up to its tick, and so is a tick ahead.
+    # A row has what was learned up to its tick, and so is a tick ahead.
     found = np.vstack([np.zeros(4), found[:-1]])
     if np.abs(expected).max() == 0.0:
         assert not found.any()

@@ -23,7 +23,7 @@ from phonotaxis.testing import Bench, assert_linearization, evaluate
 from systems.base.diff_drive_plant import DiffDrivePlant
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
-from systems.base.tyre_grip import GripNumbers, grip_accelerations
+from systems.base.tire_grip import GripNumbers, grip_accelerations
 
 ROBOT = RobotParameters()
 G, LAG, RADIUS, HALF = 9.81, 0.05, 0.06, 0.41 / 2

@@ -154,7 +154,7 @@ def _is_doubtful(delays: DelayEstimate) -> bool:
     return delays.closure > _LARGEST_CLOSURE_S or delays.ambiguity > _LARGEST_AMBIGUITY
 
 
-class Localiser:
+class Localizer:
     """Locates the sources of sound in successive frames of audio.
 
     The frames have the form that ``MicArray`` publishes. If the band allows it, the
@@ -230,7 +230,7 @@ class Localiser:
         echoes = np.zeros(self._sizes.shape, np.float32)
         return HearingMemory(0.0, 0.0, echoes)
 
-    def localise(
+    def localize(
         self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[SourceFix | None, HearingMemory]:
         """Locates the dominant sound of an audio frame.
@@ -266,7 +266,7 @@ class Localiser:
 
         Returns:
             Two values: the list of sounds, and the new memory. The list begins with the
-            sound that ``localise`` finds, if any. Further sounds follow in the order of
+            sound that ``localize`` finds, if any. Further sounds follow in the order of
             ``estimate_delay_sets``.
 
         Raises:
