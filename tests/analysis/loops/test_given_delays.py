@@ -91,7 +91,7 @@ def test_the_simulated_diagram_agrees():
         diagram = integrator_loop(gain, period, delay_s=delay_s)
         simulator = Simulator(diagram)
         context = simulator.get_mutable_context()
-        context.SetContinuousState(np.ones(1))
+        context.get_mutable_continuous_state_vector()[0] = 1.0
         sizes = []
         for k in range(1, 400):
             simulator.AdvanceTo(k * period)
