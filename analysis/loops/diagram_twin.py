@@ -17,18 +17,15 @@ from pydrake.systems.framework import (
     InputPortIndex,
     LeafSystem_,
     OutputPortIndex,
-    PortDataType,
 )
 
 from analysis.loops.autodiff import value_and_gradient
-from analysis.loops.diagram_ports import ports_of
+from analysis.loops.diagram_ports import carries_numbers, ports_of
 from analysis.loops.diagram_state import get_state, set_state
+from systems.framework.differences import STEP
 from systems.framework.input_error import InputError
 from systems.framework.scalar_math import float_of
 
-#: Step of the differences, relative to the value, and absolute for values below 1. The
-#: errors by truncation and by rounding are then about equal.
-_STEP = float(np.finfo(float).eps) ** (1.0 / 3.0)
 #: Numbers that identify a body or sensor. To vary them has no meaning.
 _IDENTITY = "feature"
 
@@ -199,7 +196,7 @@ class BlockByDifferences(LeafSystem_[AutoDiffXd]):  # type: ignore[misc]
         for k in np.flatnonzero(gradient.any(axis=1)):
             if _IDENTITY not in names[k]:
                 step = np.zeros(len(point))
-                step[k] = _STEP * max(1.0, abs(point[k]))
+                step[k] = STEP * max(1.0, abs(point[k]))
                 slope = (at(point + step) - at(point - step)) / (2.0 * step[k])
                 found += np.outer(slope, gradient[k])
         return np.array(
@@ -210,9 +207,7 @@ class BlockByDifferences(LeafSystem_[AutoDiffXd]):  # type: ignore[misc]
 def _refuse_objects(block: Any, own: Any) -> None:
     """Raises InputError if a block has objects as state, input or output."""
     ports = [*ports_of(block, "input"), *ports_of(block, "output")]
-    objects = [
-        p.get_name() for p in ports if p.get_data_type() != PortDataType.kVectorValued
-    ]
+    objects = [p.get_name() for p in ports if not carries_numbers(p)]
     if own.num_abstract_states():
         objects.append("its state")
     if objects:

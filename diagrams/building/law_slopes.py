@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 
-#: Step of the differences relative to the argument, and absolute below 1. Truncation
-#: and rounding then contribute about equally to the error.
-_STEP = float(np.finfo(float).eps) ** (1.0 / 3.0)
+from systems.framework.differences import STEP
 
 
 def force_with_slopes(
@@ -59,7 +57,7 @@ def _parts(value: Any) -> tuple[float, Any]:
 
 
 def _slope(function: Callable[[float], Any], x: float) -> float:
-    h = _STEP * max(1.0, x)
+    h = STEP * max(1.0, x)
     if x > h:
         return (float(function(x + h)) - float(function(x - h))) / (2.0 * h)
     here, near, far = (float(function(x + k * h)) for k in range(3))
