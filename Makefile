@@ -53,8 +53,9 @@ docs: .venv/.installed-docs ## build the documentation into build/site, links ch
 	@$(PY) -m sphinx -q -W --keep-going -c docs . build/site
 	@echo "Open build/site/index.html; it needs no network."
 
-results: .venv/.installed ## write the numbers of README and docs from docs/results
+results: .venv/.installed ## write the numbers of README and docs, and notebooks
 	@$(PY) -m docs.building.result_blocks
+	@$(PY) -m docs.building.notebooks
 
 package: .venv/.installed-dev ## build the package, and use it where the sources are not
 	@.ci/check_package

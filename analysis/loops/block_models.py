@@ -19,6 +19,7 @@ from pydrake.systems.analysis import DiscreteTimeApproximation
 from analysis.loops.autodiff import seed, value_and_gradient
 from analysis.loops.diagram_ports import ports_of
 from analysis.loops.diagram_state import set_discrete_state
+from analysis.loops.diagram_twin import autodiff_twin
 from analysis.loops.ideal_loop import IdealLoop
 from analysis.loops.linear_models import LinearModel
 from diagrams.running.simulation import simulator_config
@@ -155,7 +156,7 @@ def sampled_twin(loop: IdealLoop, role: str) -> Any:
     if role not in loop.sampled_twins:
         config = simulator_config(loop.scenario)
         sampled = DiscreteTimeApproximation(loop.block(role), loop.tick_s, config)
-        loop.sampled_twins[role] = sampled.ToAutoDiffXd()
+        loop.sampled_twins[role] = autodiff_twin(sampled)
     return loop.sampled_twins[role]
 
 

@@ -21,6 +21,7 @@ from analysis.loops.diagram_state import get_state, set_state
 from analysis.loops.diagram_timing import Timing, first_update, leaf_systems
 from analysis.loops.linear_models import LinearModel
 from analysis.loops.linearized_diagram import LinearizedDiagram, Undifferentiated
+from systems.framework.differences import slopes_at
 from systems.framework.input_error import InputError
 
 #: Relative change of the Jacobian below which an integration step is short enough.
@@ -188,20 +189,13 @@ class DiagramMap:
         """Returns the Jacobian, its estimated error, and the kinks of its elements."""
         point = self.point
         here = self._map(simulator, point)
-        slopes = np.zeros((2, len(here), len(point)))
-        kinks = np.zeros((len(here), len(point)))
+        near, far, kinks = np.zeros((3, len(here), len(point)))
         for k in range(len(point)):
-            for size, factor in enumerate((1.0, 2.0)):
-                step = factor * _STEP * max(1.0, abs(point[k]))
-                sides = []
-                for sign in (1.0, -1.0):
-                    moved = point.copy()
-                    moved[k] += sign * step
-                    sides.append((self._map(simulator, moved) - here) / (sign * step))
-                slopes[size, :, k] = (sides[0] + sides[1]) / 2.0
-                if size == 0:
-                    kinks[:, k] = np.abs(sides[0] - sides[1])
-        near, far = slopes
+            found = slopes_at(
+                lambda moved: self._map(simulator, moved), point, here, k, _STEP
+            )
+            near[:, k], far[:, k] = found.near, found.far
+            kinks[:, k] = np.abs(found.ahead - found.behind)
         # The error of a central difference grows with the square of the step.
         jacobian = near + (near - far) / 3.0
         scale = np.maximum(1.0, np.abs(jacobian))

@@ -90,7 +90,7 @@ def find_signals(system: Any, wanted: Sequence[Any] | None, kind: Kind) -> list[
     """
     if wanted is None:
         own = ports_of(system, kind)
-        return [_signal("", (), port, kind) for port in own if _is_vector(port)]
+        return [_signal("", (), port, kind) for port in own if carries_numbers(port)]
     if isinstance(wanted, str):
         wanted = [wanted]
     known = dict(_all_ports(system, kind))
@@ -102,7 +102,7 @@ def find_signals(system: Any, wanted: Sequence[Any] | None, kind: Kind) -> list[
             hint = f"did you mean {near[0]!r}?" if near else _list(known)
             raise InputError(f"{kind}s", f"{str(key)!r} is no {kind} port; {hint}")
         where, port = known[key]
-        if not _is_vector(port):
+        if not carries_numbers(port):
             raise InputError(
                 f"{kind}s", f"{key!r} has an abstract value; choose a vector port"
             )
@@ -155,7 +155,8 @@ def _list(known: dict[str, Any]) -> str:
     return f"it has {', '.join(list(known)[:8])}" if known else "it has none"
 
 
-def _is_vector(port: Any) -> bool:
+def carries_numbers(port: Any) -> bool:
+    """Returns whether a port carries numbers; otherwise, it carries an object."""
     return bool(port.get_data_type() == PortDataType.kVectorValued)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from analysis.loops.given_loops import as_linear_model
 from analysis.loops.growth_bound import MOST_PARTS, Family, GrowthBound, bound_growth
 from analysis.loops.stable_scale import StableScale, stable_scale
+from analysis.report.plain_values import pick, plain
 from systems.framework.input_error import InputError
 
 Vector = NDArray[np.float64]
@@ -58,6 +59,12 @@ class Robustness:
         """Difference of both growth rates, as a share of the one that was found."""
         difference = self.proven_growth_per_s - self.growth_per_s
         return difference / abs(self.growth_per_s) if self.growth_per_s else math.inf
+
+    def document(self) -> dict[str, Any]:
+        """Returns the values for a JSON document; infinity becomes None."""
+        names = [each.name for each in fields(self)]
+        found: dict[str, Any] = plain(pick(self, "verdict", "gap", *names))
+        return found
 
     def __str__(self) -> str:
         values = ", ".join(f"{k} = {v:.6g}" for k, v in self.worst_values.items())

@@ -26,8 +26,11 @@ from analysis.loops.diagram_state import (
     run_periods,
     set_state,
 )
+from analysis.loops.diagram_timing import block_timings
+from analysis.loops.diagram_twin import autodiff_twin, by_differences
 from analysis.loops.ideal_scenarios import require_ideal
 from diagrams import build_sound_follower
+from diagrams.building.laws import why_law_by_differences
 from diagrams.building.robot import parts_of
 from diagrams.running.simulation import simulator_config
 from diagrams.scenario.own_versions import loaded_digests
@@ -69,8 +72,8 @@ class IdealLoop:
     float diagram. The state vector has first the continuous states of the diagram, then
     its discrete groups. ``state_names`` names the elements. A period begins just before
     one control update and ends just before the next. The scenario must have exact
-    sensors, as the result of ``ideal_scenario`` has. Raises InputError if the scenario,
-    or a user's own law, cannot be differentiated.
+    sensors, as the result of ``ideal_scenario`` has. Raises InputError if the scenario
+    cannot be differentiated.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -78,21 +81,17 @@ class IdealLoop:
         self.scenario = scenario
         self.follower = build_sound_follower(scenario)
         self._require_forces()
-        twin: Any = self.follower.diagram.ToAutoDiffXdMaybe()
-        if twin is None:
-            raise InputError(
-                "law",
-                f"the block of {scenario.only.law!r} has no AutoDiffXd form; write it "
-                "as a function law(c, s, laws) with pydrake.math, or as a "
-                "TemplateSystem of float and AutoDiffXd",
-            )
-        self.twin: Any = twin
+        self._require_one_period()
+        self.twin: Any = autodiff_twin(self.follower.diagram)
+        twins = map(
+            self.twin.GetSubsystemByName,
+            (*self.follower.sources, *self.follower.robots),
+        )
         self._twin_blocks = {
             part: block
-            for name in (*self.follower.sources, *self.follower.robots)
-            for part, block in parts_of(twin.GetSubsystemByName(name)).blocks.items()
+            for twin in twins
+            for part, block in parts_of(twin).blocks.items()
         }
-        self._try_law()
         self.state_names: tuple[str, ...] = self._names()
         self.sampled_twins: dict[str, Any] = {}
         """Continuous blocks as AutoDiffXd blocks in discrete time, by role. Module
@@ -116,34 +115,37 @@ class IdealLoop:
                     "such a law, or simulate",
                 )
 
-    def _try_law(self) -> None:
-        """Evaluates a user's own law with AutoDiffXd, to report its errors early."""
-        if ":" not in self.scenario.only.law:
-            return
-        block = self.block("controller", twin=True)
-        context = block.CreateDefaultContext()
-        inputs = {
-            "p_WS_estimated": [2.0, 0.0],
-            "target_valid": [1.0],
-            "collision_vectors_B": [0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
-            "features": [1.0, 0.0, 0.0],
-            "pose_WB_estimated": [0.0, 0.0, 0.0],
-            "v_WP": [0.0, 0.0],
-        }
-        variables = seed(np.concatenate(list(inputs.values())))
-        ends = np.cumsum([len(value) for value in inputs.values()])
-        for name, part in zip(inputs, np.split(variables, ends[:-1]), strict=True):
-            block.GetInputPort(name).FixValue(context, part)
-        try:
-            block.GetOutputPort("acceleration_W").Eval(context)
-        except Exception as error:  # whatever a user's function raises
-            own = error.__cause__ or error
-            raise InputError(
-                "law",
-                f"{self.scenario.only.law!r} cannot be differentiated "
-                f"({type(own).__name__}: {own}); write it with pydrake.math "
-                "(exp, sqrt, ...) instead of math and numpy",
-            ) from error
+    def _require_one_period(self) -> None:
+        """Raises InputError if a block does not update once per control period."""
+        for path, timing in block_timings(self.follower.diagram):
+            if timing is None or abs(timing.period_s - self.tick_s) > 1e-9:
+                period = f"every {timing.period_s:g} s" if timing else "irregularly"
+                raise InputError(
+                    "blocks",
+                    f"{path.rpartition('/')[2]} updates {period}, and the report needs "
+                    f"an update per control period of {self.tick_s:g} s; use this "
+                    "period, or linearize the diagram over the common period: "
+                    "phonotaxis.linearize(diagrams.build_sound_follower(scenario)"
+                    ".diagram, context)",
+                )
+
+    def differences(self) -> tuple[str, ...]:
+        """Returns what Drake cannot differentiate, a sentence each.
+
+        The derivatives of these laws and blocks are differences.
+        """
+        found = [
+            f"The block {role} does not convert to AutoDiffXd. Its derivatives are "
+            "differences."
+            for role, block in self._twin_blocks.items()
+            if by_differences(block)
+        ]
+        if why := why_law_by_differences(self.scenario):
+            found.append(
+                f"Drake cannot differentiate the law {self.scenario.only.law} ({why}). "
+                "Its derivatives are differences."
+            )
+        return tuple(found)
 
     def block(self, role: str, *, twin: bool = False) -> Any:
         """Returns the block of a role, such as "controller".

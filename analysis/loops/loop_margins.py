@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from analysis.loops.frequency_levels import (
     with_middles,
 )
 from analysis.loops.linear_models import LinearModel
+from analysis.loops.margin_plots import PlotKind, plot_margins
 from analysis.loops.open_loops import (
     BREAK_POINTS,
     DIRECTIONS,
@@ -34,7 +36,11 @@ from analysis.loops.open_loops import (
     open_loop,
 )
 from analysis.loops.operating_points import OperatingPoint
+from analysis.report.plain_values import pick, plain
 from systems.framework.input_error import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Skews of the disk margins. -1 emphasizes reductions of the gain, 1 emphasizes
 #: increases, and 0 treats reductions and increases alike.
@@ -85,7 +91,12 @@ class DiskMargin:
             "skew", "alpha", "gain_low", "gain_high", "gain_margin_db",
             "phase_margin_deg", "frequency_rad_s",
         )  # fmt: skip
-        return {name: getattr(self, name) for name in names}
+        return pick(self, *names)
+
+    def document(self) -> dict[str, Any]:
+        """Returns the values for a JSON document; infinity and NaN become None."""
+        found: dict[str, Any] = plain(self)
+        return found
 
     @property
     def gain_low(self) -> float:
@@ -188,6 +199,32 @@ class LoopMargins:
             "disk": str(self.disk),
         }
         return "\n".join([f"{self.name}: the closed loop is stable", *_aligned(rows)])
+
+    def document(self) -> dict[str, Any]:
+        """Returns the values for a JSON document; infinity and NaN become None."""
+        names = (
+            "name", "stable", "gain_increase_margin", "gain_reduction_margin",
+            "gain_margin_db", "phase_lag_margin_deg", "phase_lead_margin_deg",
+            "crossover_rad_s", "phase_margin_deg", "delay_margin_s", "modulus_margin",
+            "modulus_frequency_rad_s", "sensitivity_peak", "complementary_peak",
+            "disks",
+        )  # fmt: skip
+        found: dict[str, Any] = plain(pick(self, *names))
+        return found
+
+    def plot(self, kind: PlotKind = "bode") -> Figure:
+        """Plots the loop transfer function and marks the points behind the margins.
+
+        Args:
+            kind: Kind of the plot: ``bode``, ``nyquist`` or ``nichols``.
+
+        Returns:
+            The figure. The curves are those of the package ``control``.
+
+        Raises:
+            InputError: The kind is not known.
+        """
+        return plot_margins(self, kind)
 
     @cached_property
     def response(self) -> FrequencyResponse:

@@ -47,6 +47,10 @@ class MultiloopDiskMargin(DiskMargin):
     """Size of a disk that contains a destabilizing change. For up to three loops, it
     equals ``alpha`` up to rounding errors."""
 
+    def to_dict(self) -> dict[str, float]:
+        """Values for the JSON document."""
+        return {**super().to_dict(), "destabilizing_alpha": self.destabilizing_alpha}
+
 
 def multiloop_disk_margin(model: LinearModel, skew: float = 0.0) -> MultiloopDiskMargin:
     """Computes the disk margin of a loop L with n inputs and n outputs.

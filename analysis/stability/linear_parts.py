@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from analysis.loops.equilibria import EquilibriumSearch, find_equilibria
+from analysis.loops.ideal_loop import ideal_loop
 from analysis.loops.linear_models import LinearModel, Mode
 from analysis.loops.linear_plots import plot_equilibria, plot_step
 from analysis.loops.linearization import (
@@ -362,7 +363,9 @@ OPERATING_POINTS = Part[OperatingPoints](
         ),
     ),
     document=_points_document,
-    notes=lambda data: data.search.notes,
+    notes=lambda data: (
+        *ideal_loop(data.search.scenario).differences(), *data.search.notes
+    ),
 )  # fmt: skip
 
 LINEAR_MODELS = Part[LinearModels](

@@ -150,13 +150,13 @@ def _document(data: Margins) -> dict[str, Any]:
         "target_loop": {
             "cut_at": "sensor",
             **_loop_document(data.target_poles, data.target["sensor"]),
-            "margins": {at: _margin_document(m) for at, m in data.target.items()},
+            "margins": {at: m.document() for at, m in data.target.items()},
         },
         "implemented_loop": {
             "cut_at": sensor.name,
             **_loop_document(data.at.eigenvalues, sensor),
             "margins": {
-                f"{found.at}_{found.direction}": _margin_document(found.margins)
+                f"{found.at}_{found.direction}": found.margins.document()
                 for found in data.implemented
             },
         },
@@ -176,15 +176,6 @@ def _loop_document(
         "delay_margin_s": margins.delay_margin_s,
         "disk_margin": margins.disk.alpha,
     }
-
-
-def _margin_document(margins: LoopMargins) -> dict[str, Any]:
-    return pick(
-        margins, "stable", "gain_increase_margin", "gain_reduction_margin",
-        "gain_margin_db", "phase_lag_margin_deg", "phase_lead_margin_deg",
-        "crossover_rad_s", "phase_margin_deg", "delay_margin_s", "modulus_margin",
-        "modulus_frequency_rad_s", "sensitivity_peak", "complementary_peak", "disks",
-    )  # fmt: skip
 
 
 def _show(data: Margins) -> list[Content]:

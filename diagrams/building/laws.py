@@ -7,7 +7,7 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-from diagrams.building.own_laws import checked_law, try_law
+from diagrams.building.own_laws import checked_law, try_law, why_by_differences
 from diagrams.building.robots.routed_robot import make_trajectory_controller
 from diagrams.building.robots.searching_robot import search_controller
 from diagrams.scenario.own_classes import asked_for, made
@@ -108,6 +108,22 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     reach, top_speed = robot.ultrasonic.maximum_range_m, robot.robot.top_speed_m_s
     try_law(function, arguments, reach, top_speed)
     return _radial(function, {**parts, "arguments": arguments})
+
+
+def why_law_by_differences(scenario: Scenario) -> str:
+    """Returns why the derivatives of a user's own force law are differences.
+
+    The result is empty if Drake differentiates the law, or if it is no user's function.
+    """
+    robot = scenario.only
+    if not isinstance(robot, HasRangeSensors) or ":" not in robot.law:
+        return ""
+    law = import_own(robot.law, "law")
+    if inspect.isclass(law):
+        return ""
+    arguments = law_arguments(law, robot.laws, robot.own_gains)
+    reach, top_speed = robot.ultrasonic.maximum_range_m, robot.robot.top_speed_m_s
+    return why_by_differences(law, arguments, reach, top_speed)
 
 
 def _radial(law: Any, parts: dict[str, Any]) -> Any:

@@ -30,21 +30,33 @@ class Block(NamedTuple):
     """Name of the file that it is; empty: it is run."""
 
 
+def page_parts(page: str) -> list[str | Block]:
+    """Returns the texts of a page, and its files, commands and Python, in order.
+
+    Args:
+        page: File name in docs.
+    """
+    text, start = (DOCS / page).read_text("utf-8"), 0
+    found: list[str | Block] = []
+    for match in _BLOCK.finditer(text):
+        mark = match["mark"] or ""
+        if mark == "not run":
+            continue
+        file = mark.removeprefix("file: ") if mark.startswith("file: ") else ""
+        if file or match["language"] in ("sh", "python"):
+            found.append(text[start : match.start()])
+            found.append(Block(match["language"], match["text"], file))
+            start = match.end()
+    return [*found, text[start:]]
+
+
 def page_blocks(page: str) -> list[Block]:
     """Files, commands and Python of a page of docs, in order.
 
     Args:
         page: File name in docs.
     """
-    found = []
-    for match in _BLOCK.finditer((DOCS / page).read_text("utf-8")):
-        mark = match["mark"] or ""
-        if mark == "not run":
-            continue
-        file = mark.removeprefix("file: ") if mark.startswith("file: ") else ""
-        if file or match["language"] in ("sh", "python"):
-            found.append(Block(match["language"], match["text"], file))
-    return found
+    return [part for part in page_parts(page) if isinstance(part, Block)]
 
 
 def page_file(page: str, name: str) -> str:

@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator_, SimulatorConfig
 
+from analysis.loops.diagram_ports import carries_numbers, ports_of
 from phonotaxis.testing.ports import (
-    carries_numbers,
     differentiates,
     elements,
     example,
     input_port,
-    input_ports,
     numbers_of,
     output_port,
-    output_ports,
     port_value,
 )
 from systems.framework.block import copied, has_arrays, period_of
@@ -126,7 +124,7 @@ class Bench:
             InputError: See ``output``.
         """
         if names is None:
-            names = [port.get_name() for port in output_ports(self.block)]
+            names = [port.get_name() for port in ports_of(self.block, "output")]
         return {name: self.output(name) for name in names}
 
     @property
@@ -271,7 +269,7 @@ class Bench:
         # The update of no tick has been done, and its outputs are not known.
         self.context.SetAbstractState(0, (-1, copied(state), None))
         if step.publish is not None:
-            ports = filter(carries_numbers, output_ports(self.block))
+            ports = filter(carries_numbers, ports_of(self.block, "output"))
             published = [np.zeros(port.size()) for port in ports]
             step.publish(state, published, step.numbers)
             self.context.SetDiscreteState(np.concatenate(published))
@@ -299,7 +297,9 @@ class Bench:
 
     def _missing(self, message: str, port: Any) -> list[Any]:
         """Returns the inputs without value that an evaluation needs."""
-        unset = [p for p in input_ports(self.block) if not p.HasValue(self.context)]
+        unset = [
+            p for p in ports_of(self.block, "input") if not p.HasValue(self.context)
+        ]
         if port is not None:
             index = port.get_index()
             has_feedthrough = self.block.HasDirectFeedthrough

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.loops.diagram_ports import carries_numbers, ports_of
 from phonotaxis.testing.bench import Bench
 from phonotaxis.testing.ports import (
-    carries_numbers,
     input_port,
-    output_ports,
 )
 from systems.framework.finite import block_name
 from systems.framework.input_error import InputError
@@ -133,7 +132,7 @@ def run(
         states.append(bench.state)
         rows.append(bench.outputs(names))
     found = {name: [row[name] for row in rows] for name in rows[0]}
-    numeric = {p.get_name() for p in output_ports(block) if carries_numbers(p)}
+    numeric = {p.get_name() for p in ports_of(block, "output") if carries_numbers(p)}
     return History(
         np.array(times),
         {n: np.array(v) if n in numeric else v for n, v in found.items()},

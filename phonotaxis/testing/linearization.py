@@ -11,16 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
 
+from analysis.loops.diagram_ports import carries_numbers, ports_of
 from diagrams.scenario.suggestions import did_you_mean
 from phonotaxis.testing.bench import Bench
-from phonotaxis.testing.ports import carries_numbers, output_ports
+from systems.framework.differences import EPSILON, STEP, Slopes, slopes_at
 from systems.framework.finite import block_name
 from systems.framework.input_error import InputError
 
-_EPSILON = float(np.finfo(float).eps)
-# With this step, truncation and rounding contribute equally to the error of central
-# differences of a function whose values and derivatives are near 1.
-_STEP = _EPSILON ** (1.0 / 3.0)
 # Factor between the estimated error of a difference and the tolerance.
 _SAFETY = 10.0
 # Largest relative tolerance. A larger error shows that the block is not smooth.
@@ -36,7 +33,7 @@ def assert_linearization(
     outputs: Iterable[str] | None = None,
     hold: Collection[str] = (),
     model: Any = None,
-    step: float = _STEP,
+    step: float = STEP,
     tolerance: float | None = None,
     **inputs: Any,
 ) -> None:
@@ -77,7 +74,7 @@ def assert_linearization(
         InputError: The block does not convert to AutoDiffXd, the shape of the model
             does not fit, or see ``evaluate``.
     """
-    numbers = [p.get_name() for p in output_ports(block) if carries_numbers(p)]
+    numbers = [p.get_name() for p in ports_of(block, "output") if carries_numbers(p)]
     bench = Bench(block, time_s=time_s, state=state, **inputs)
     point = _Point(
         bench,
@@ -257,45 +254,40 @@ def _matrix(point: _Point, model: Any) -> NDArray[np.float64]:
 class _Difference:
     """Finite differences of the response by one element of the vector."""
 
-    step: float
-    central: NDArray[np.float64]
-    """Central differences with this step."""
-    change: NDArray[np.float64]
-    """Changes of the central differences if the step is doubled."""
-    ahead: NDArray[np.float64]
-    """One-sided differences."""
-    behind: NDArray[np.float64]
+    slopes: Slopes
     size: NDArray[np.float64]
     """Magnitudes of the values from which the differences follow."""
+
+    @property
+    def step(self) -> float:
+        """Step of the element."""
+        return self.slopes.step
+
+    @property
+    def central(self) -> NDArray[np.float64]:
+        """Central differences with this step."""
+        return self.slopes.near
+
+    @property
+    def change(self) -> NDArray[np.float64]:
+        """Changes of the central differences if the step is doubled."""
+        return np.abs(self.slopes.far - self.slopes.near)
 
     @classmethod
     def at(cls, point: _Point, k: int, step: float) -> _Difference:
         """Computes the differences by element ``k``."""
-        x = point.vector
-        h = step * max(1.0, abs(x[k]))
-
-        def moved(by: float) -> NDArray[np.float64]:
-            vector = x.copy()
-            vector[k] += by
-            return point.respond(point.bench, vector)
-
-        here = point.here
-        high, low, higher, lower = (moved(by) for by in (h, -h, 2.0 * h, -2.0 * h))
-        central = (high - low) / (2.0 * h)
-        return cls(
-            h,
-            central,
-            np.abs((higher - lower) / (4.0 * h) - central),
-            (high - here) / h,
-            (here - low) / h,
-            np.maximum(np.abs(here), max(1.0, float(np.abs(x).max()))),
+        x, here = point.vector, point.here
+        found = slopes_at(
+            lambda moved: point.respond(point.bench, moved), x, here, k, step
         )
+        size = np.maximum(np.abs(here), max(1.0, float(np.abs(x).max())))
+        return cls(found, size)
 
     def tolerance(self, tolerance: float | None) -> NDArray[np.float64]:
         """Returns the tolerance of each derivative."""
         if tolerance is not None:
             return tolerance * np.maximum(1.0, np.abs(self.central))
-        rounding = 4.0 * _EPSILON * self.size / self.step
+        rounding = 4.0 * EPSILON * self.size / self.step
         return _SAFETY * (self.change + rounding)
 
     def is_rough(self) -> NDArray[np.bool_]:
@@ -305,7 +297,7 @@ class _Difference:
 
     def remark(self, row: int) -> str:
         """Returns a remark about a corner or a jump at the operating point."""
-        ahead, behind = float(self.ahead[row]), float(self.behind[row])
+        ahead, behind = float(self.slopes.ahead[row]), float(self.slopes.behind[row])
         apart = abs(ahead - behind) > _COARSEST * max(1.0, abs(ahead))
         if not apart and not self.is_rough()[row]:
             return ""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.value import AbstractValue
-from pydrake.systems.framework import PortDataType, System_
+from pydrake.systems.framework import System_
 
+from analysis.loops.diagram_ports import Kind, carries_numbers, ports_of
 from diagrams.scenario.suggestions import did_you_mean
 from systems.framework.finite import block_name
 from systems.framework.input_error import InputError, shortened
@@ -17,16 +17,6 @@ from systems.framework.input_error import InputError, shortened
 _DUAL = System_[AutoDiffXd]
 # Longest list of zeros that a message shows.
 _MOST_ZEROS = 9
-
-
-def input_ports(block: Any) -> list[Any]:
-    """Returns the input ports of a block, in order."""
-    return [block.get_input_port(k) for k in range(block.num_input_ports())]
-
-
-def output_ports(block: Any) -> list[Any]:
-    """Returns the output ports of a block, in order."""
-    return [block.get_output_port(k) for k in range(block.num_output_ports())]
 
 
 def input_port(block: Any, name: str) -> Any:
@@ -44,7 +34,7 @@ def input_port(block: Any, name: str) -> Any:
     """
     if block.HasInputPort(name):
         return block.GetInputPort(name)
-    raise _unknown(block, "input", input_ports(block), name)
+    raise _unknown(block, "input", name)
 
 
 def output_port(block: Any, name: str) -> Any:
@@ -62,21 +52,16 @@ def output_port(block: Any, name: str) -> Any:
     """
     if block.HasOutputPort(name):
         return block.GetOutputPort(name)
-    raise _unknown(block, "output", output_ports(block), name)
+    raise _unknown(block, "output", name)
 
 
-def _unknown(block: Any, kind: str, ports: Iterable[Any], name: str) -> InputError:
-    known = [port.get_name() for port in ports]
+def _unknown(block: Any, kind: Kind, name: str) -> InputError:
+    known = [port.get_name() for port in ports_of(block, kind)]
     return InputError(
         block_name(block),
         f"has no {kind} port {name!r}{did_you_mean(name, known)}; "
         f"its {kind} ports are {', '.join(known) or 'none'}",
     )
-
-
-def carries_numbers(port: Any) -> bool:
-    """Whether a port carries numbers; otherwise, it carries a Python object."""
-    return bool(port.get_data_type() == PortDataType.kVectorValued)
 
 
 def differentiates(block: Any) -> bool:

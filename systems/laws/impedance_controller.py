@@ -257,8 +257,8 @@ def ImpedanceController_(T):
         Args:
             law: A law of ``systems.laws.catalog`` that has a force, or a function
                 ``law(c, s, ...)``. The function returns the force away from the
-                obstacle in N for a distance c in m and a speed s in m/s. It must use
-                pydrake.math, so that Drake can differentiate it.
+                obstacle in N for a distance c in m and a speed s in m/s. With
+                pydrake.math, Drake can differentiate it.
             gains: Gains of the law. If None, a law of the catalog uses its default
                 gains.
             arguments: Arguments of a function after c and s; None means ``(gains,)``.

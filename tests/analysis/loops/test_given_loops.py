@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 
@@ -139,3 +140,40 @@ def test_refusals_name_the_remedy():
     for port in ("u", "lag.u0"):
         with pytest.raises(InputError, match="not fed by an output port"):
             phonotaxis.loop_at(diagram, diagram.CreateDefaultContext(), port)
+
+
+@pytest.mark.parametrize("kind", ["bode", "nyquist", "nichols"])
+def test_the_points_behind_the_margins_are_marked(kind):
+    # L = 0.5 / (z - 1): |L| = 1 where 2 sin(w T / 2) = 0.5, with a phase of
+    # -90 deg - w T / 2. At the Nyquist frequency, L = -1/4.
+    half = math.asin(0.25)
+    crossing, end = 2.0 * half / 0.05, math.pi / 0.05
+    phase = -90.0 - math.degrees(half)
+    unit = np.exp(1j * math.radians(phase))
+    expected = {
+        "bode": [(end, 0.25), (crossing, 1.0), (end, 0.25)],
+        "nyquist": [(-0.25, 0.0), (unit.real, unit.imag), (-0.25, 0.0)],
+        "nichols": [(-180.0, -12.04), (phase, 0.0), (-180.0, -12.04)],
+    }[kind]
+    found = phonotaxis.margins(control.tf([0.5], [1.0, -1.0], 0.05))
+    axes = found.plot(kind).axes[0]
+    marks = [line for line in axes.get_lines() if ": " in str(line.get_label())]
+    texts = [mark.get_label().partition(":")[0] for mark in marks]
+    assert texts == ["gain up", "phase", "nearest to -1"]
+    points = [np.ravel(mark.get_data()) for mark in marks]
+    np.testing.assert_allclose(points, expected, rtol=0.01, atol=0.02)
+
+
+def test_results_of_loops_have_documents():
+    process = control.tf([25.0], [1.0, 10.0, 10.0, 10.0])
+    for result in (
+        phonotaxis.margins(process),
+        phonotaxis.disk_margin(process),
+        phonotaxis.delay_margin(process),
+        phonotaxis.robustness(lambda p: [[-p["a"]]], {"a": (1.0, 2.0)}),
+    ):
+        document = json.loads(json.dumps(result.document(), allow_nan=False))
+        assert len(document) >= 5
+    assert document["verdict"] == "stable"
+    with pytest.raises(InputError, match=r"kind: is 'bod'; use one of bode, nyquist"):
+        phonotaxis.margins(process).plot("bod")

@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 from analysis.loops.contact_mode import motion_chain
+from analysis.loops.diagram_linearization import linearize
 from analysis.loops.ideal_loop import ideal_loop
 from analysis.loops.ideal_scenarios import (
     frozen_scenario,
     ideal_scenario,
     require_ideal,
 )
-from diagrams import make_simulator
+from analysis.loops.radial_law import radial_law
+from diagrams import build_sound_follower, make_simulator
 from diagrams.scenario.scenario import Scenario
+from docs.building.page_code import page_file
 from systems.framework.signals import TICK_S as T
 
 pytestmark = pytest.mark.drake
@@ -131,10 +134,13 @@ def test_wheels_that_slip_are_refused_with_a_remedy():
             analysis(slippery)
 
 
-OWN_LAWS = """
+OWN_LAWS = '''
 import math
 from pydrake.math import exp
-from pydrake.systems.framework import LeafSystem
+import numpy as np
+from systems import Block, ImpedanceController, Port, Step
+from systems.laws.catalog import CONVENTIONAL
+from systems.laws.impedance_controller import impedance_step
 
 
 def smooth(c, s, laws):
@@ -142,8 +148,50 @@ def smooth(c, s, laws):
 
 
 def rough(c, s, laws):
-    return 3.0 * math.exp(-2.0 * c)
-"""
+    push = 3.0 * math.exp(-2.0 * c) if c < 3.0 else 0.0
+    return push + 0.5 * float(np.clip(s, 0.0, 0.3))
+
+
+class Block3(Block):
+    """The conventional law's block, in floats only."""
+
+    part, stage = "controller", "control"
+    inputs, outputs = ImpedanceController.inputs, ImpedanceController.outputs
+
+    def __init__(self, robot, attraction, sensors, velocity_term, tick_s, laws):
+        super().__init__()
+        self.set_name("own_law")
+        model = ImpedanceController(
+            law=CONVENTIONAL, gains=laws.conventional, robot=robot, tick_s=tick_s,
+            attraction=attraction, sensors=sensors, velocity_term=velocity_term,
+        )
+        self.states = model.states
+
+        def step(tick, state, inputs, outputs, numbers):
+            plain = [[float(x) for x in each] for each in inputs]
+            impedance_step(tick, state, plain, outputs, numbers)
+
+        self.declare(Step(step, *model.step[1:3]), tick_s=tick_s)
+
+
+class Slow(Block):
+    """Holds the speed of P over two control periods."""
+
+    part = "slow"
+    inputs, outputs = (Port("v_WP", 2, "m/s"),), (Port("v_slow", 2, "m/s"),)
+
+    def __init__(self, tick_s):
+        super().__init__()
+        self.set_name("slow")
+
+        def step(tick, state, inputs, outputs, numbers):
+            state[:] = inputs[0]
+
+        def publish(state, outputs, numbers):
+            outputs[0][:] = state
+
+        self.declare(Step(step, (), [0.0, 0.0], publish), tick_s=2.0 * tick_s)
+'''
 
 
 @pytest.fixture
@@ -166,6 +214,68 @@ def test_a_users_law_is_linearized_like_ours(own_laws):
     assert found.y[0] == pytest.approx(force / 3.94, rel=1e-9)
 
 
-def test_a_law_without_derivative_is_refused_with_a_remedy(own_laws):
-    with pytest.raises(ValueError, match=r"law: .*rough.*pydrake\.math"):
-        rest(f"{own_laws}:rough")
+def matrix(loop):
+    state, time_s = loop.settled_state((0.6, 0.1, 0.2))
+    return loop.period_derivatives(state, time_s).A
+
+
+def test_a_law_that_refuses_autodiff_is_linearized_by_differences(own_laws):
+    """Both laws of the file have the same force before a body at rest."""
+    loop = rest(f"{own_laws}:rough")
+    (said,) = loop.differences()
+    assert "cannot differentiate the law" in said
+    assert rest(f"{own_laws}:smooth").differences() == ()
+    law = radial_law(loop.scenario)
+    for c, s in ((1.062, 0.0), (1.062, 0.2), (1e-7, 0.2)):
+        slopes = -6.0 * math.exp(-2.0 * c), 0.5
+        assert law.gradient(c, s) == pytest.approx(slopes, rel=1e-8)
+    assert law.gradient(3.5, 0.5) == pytest.approx((0.0, 0.0), abs=1e-8)
+    smooth = rest(f"{own_laws}:smooth")
+    at = (0.6, 0.1, 0.2)
+    slopes = [
+        each.period_derivatives(*each.settled_state(at)).A[
+            :, [each.state_names.index(f"plant.{k}") for k in ("x", "y", "theta")]
+        ]
+        for each in (loop, smooth)
+    ]
+    np.testing.assert_allclose(*slopes, atol=1e-8)
+
+
+def test_a_law_block_of_floats_is_linearized_by_differences(own_laws):
+    """The same computation as the conventional law, whose block converts."""
+    loop = rest(f"{own_laws}:Block3")
+    (said,) = loop.differences()
+    assert said.startswith("The block controller does not convert")
+    ours = rest("conventional")
+    A, expected = matrix(loop), matrix(ours)
+    vary = [k for k, name in enumerate(ours.state_names) if "feature" not in name]
+    assert np.abs(expected[:, vary]).max() > 1.0
+    np.testing.assert_allclose(A[:, vary], expected[:, vary], atol=1e-7)
+
+
+def test_a_block_with_its_own_state_is_linearized_by_differences(tmp_path, monkeypatch):
+    """The page's command computes what ours does, in floats."""
+    for name in ("rear_sonar.py", "careful_command.py"):
+        (tmp_path / name).write_text(page_file("extending.md", name), "utf-8")
+    monkeypatch.chdir(tmp_path)
+    loop = rest(blocks=["rear_sonar.py:RearSonar", "careful_command.py:CarefulCommand"])
+    said = " ".join(loop.differences())
+    assert "block rear_sonar" in said
+    assert "block command" in said
+    A, expected = matrix(loop), matrix(rest())
+    sonar = loop.indices("rear_sonar")
+    kept = [k for k in range(len(A)) if k not in sonar]
+    assert len(kept) == len(expected)
+    np.testing.assert_allclose(A[np.ix_(kept, kept)], expected, atol=1e-7)
+
+
+def test_a_block_with_another_period_is_refused_with_a_remedy(own_laws):
+    blocks = {"blocks": [f"{own_laws}:Slow"]}
+    with pytest.raises(ValueError, match=r"slow updates every 0\.05 s.*linearize"):
+        rest(**blocks)
+    scenario = ideal_scenario(Scenario.model_validate(blocks))
+    found = linearize(build_sound_follower(scenario).diagram)
+    assert found.model.period_s == pytest.approx(2.0 * T)
+    assert ("robot/slow", "does not convert") in {
+        (each.where, each.why[:16]) for each in found.undifferentiated
+    }
