@@ -5,7 +5,8 @@ The robot is in one of five modes:
 - waiting, if there is no target
 - driving along the route that ``systems.planning.way`` finds
 - looking around, before the first motion or at a cell that blocks the robot
-- backing off, after the robot has stayed in one place for too long
+- backing off, after the robot has stayed in one place for too long, or if it cannot
+  turn
 - giving up, after all routes have led through occupied cells for too long
 
 In every mode, ``systems.planning.evasion`` may replace the motion to avoid moving
@@ -152,10 +153,16 @@ class DriveMemory(NamedTuple):
     """(2,) headings of the current look, rad."""
     looks_done: NDArray[np.float64]
     """Number of headings of the current look that are done."""
+    looks_held: NDArray[np.float64]
+    """Number of headings of the current look to which the guard did not let the robot
+    turn.
+    """
     block: NDArray[np.float64]
     """(2,) position of the cell that blocks the robot, m."""
+    backs: NDArray[np.float64]
+    """Direction of backing off: -1 back, or 1 ahead."""
     backed_s: NDArray[np.float64]
-    """Start of backing off, s."""
+    """Start of backing off in this direction, s."""
     held: NDArray[np.float64]
     """Speed that the guard last refused, m/s, or 0."""
     held_s: NDArray[np.float64]
@@ -279,15 +286,37 @@ def drive_guarded(
         ahead, at = pose[2] + error, numbers.widths[1] + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
         mark_blocked(state.way, place, time + _MARK_S)
-        m.mode[0], m.backed_s[0], m.planned_s[0] = BACKING, time, -np.inf
+        _begin_backing(m, time)
     if m.mode[0] == BACKING:
-        m.speed[0] = -BACK_SPEED_M_S
-        if time - m.backed_s[0] > _BACKING_S:
-            m.mode[0], m.blocked_s[0] = DRIVING, time
-            _stays(m, pose, time)
+        _back(m, time, pose, report)
     if m.mode[0] == DRIVING:
         _drive(time, velocity, wanted, error, there, state, numbers)
     _evade(time, pose, wanted, error, state, numbers)
+
+
+@njit(cache=True)
+def _begin_backing(m: DriveMemory, time: float) -> None:  # pragma: no cover  (compiled)
+    """Begins to back off. The robot plans a new route."""
+    m.mode[0], m.backs[0] = BACKING, -1.0
+    m.backed_s[0], m.planned_s[0] = time, -np.inf
+
+
+@njit(cache=True)
+def _back(
+    m: DriveMemory, time: float, pose: Any, report: Any
+) -> None:  # pragma: no cover  (compiled)
+    """Drives back for ``_BACKING_S``, or ahead if the guard does not let it drive back.
+
+    A robot that can neither turn nor drive back gets room for the turn ahead.
+    """
+    since = time - m.backed_s[0]
+    held = report[0] >= TURNED and since > _PATIENCE_S
+    if held and m.backs[0] < 0.0:
+        m.backs[0], m.backed_s[0] = 1.0, time
+    elif held or since > _BACKING_S:
+        m.mode[0], m.blocked_s[0] = DRIVING, time
+        _stays(m, pose, time)
+    m.speed[0] = m.backs[0] * BACK_SPEED_M_S
 
 
 @njit(cache=True)
@@ -416,7 +445,8 @@ def _begin_look(time, pose, ahead, m, space, numbers):  # type: ignore[no-untype
     if abs(wrapped(left - pose[2])) > abs(wrapped(right - pose[2])):
         left, right = right, left
     m.headings[0], m.headings[1] = left, right
-    m.looks_done[0], m.mode[0], m.blocked_s[0] = 0.0, LOOKING, time
+    m.looks_done[0], m.looks_held[0] = 0.0, 0.0
+    m.mode[0], m.blocked_s[0] = LOOKING, time
 
 
 @register_jitable
@@ -424,7 +454,8 @@ def _look(time, pose, report, state):  # type: ignore[no-untyped-def]
     """Turns the robot to both sides of the blocking cell until the guard reports room.
 
     If there is still no room after both sides, routes avoid the cell for ``_MARK_S``.
-    The first look always turns to both sides and marks no cell.
+    If the guard has let the robot turn to neither side, the robot backs off. The first
+    look always turns to both sides and marks no cell.
     """
     m = state.memory
     first = m.has_looked[0] < 0.5
@@ -435,11 +466,14 @@ def _look(time, pose, report, state):  # type: ignore[no-untyped-def]
     held = report[0] >= BRAKED and time - m.blocked_s[0] > _PATIENCE_S
     if abs(to) < _LOOKED_RAD or held:
         m.looks_done[0], m.blocked_s[0] = m.looks_done[0] + 1.0, time
+        m.looks_held[0] += 1.0 if held else 0.0
     seen = not first and report[1] > _ROOM_M
     if m.looks_done[0] > 1.5 or seen:
         if not first and not seen:
             mark_blocked(state.way, (m.block[0], m.block[1]), time + _MARK_S)
         m.mode[0], m.blocked_s[0], m.planned_s[0] = DRIVING, time, -np.inf
+        if not first and not seen and m.looks_held[0] > 1.5:
+            _begin_backing(m, time)
         m.has_looked[0] = 1.0
 
 

@@ -30,17 +30,18 @@ _ROUNDS, _SILENT_S = 3, 0.2
 # ``_BESIDE_RAD``: any sensor is frozen if its echoes stay equal while the robot turns
 #   by the aperture of the sensor plus this angle, rad.
 _MOST_EQUAL, _BESIDE_RAD = 12, 0.1
-# Motion and noise can cause a second difference of a range up to the sum of three
-# terms.
-# ``_STEP_M``: first term, m.
-# ``_STEP_M_S2``: acceleration in the second term, m/s^2. The factor is the squared time
-#   of a round.
+# A spike is a range that differs from the range before it and from the range after it,
+# in the same direction. A surface that enters or leaves a beam causes a step, which is
+# no spike. Motion and noise can cause a spike up to the sum of three terms.
+# ``_SPIKE_M``: first term, m.
+# ``_SPIKE_M_S2``: acceleration in the second term, m/s^2. The factor is the squared
+#   time of a round.
 # ``_SIGMAS``: third term as a number of standard deviations of the noise.
-_STEP_M, _STEP_M_S2, _SIGMAS = 0.03, 2.0, 15.0
-# A strange reading is a reading that motion and noise cannot explain.
-# ``_PART``: weight of one reading in the mean share of strange readings.
-# ``_MOST_STRANGE``: mean share above which a sensor is noisy.
-_PART, _MOST_STRANGE = 0.1, 0.5
+_SPIKE_M, _SPIKE_M_S2, _SIGMAS = 0.015, 1.0, 7.5
+# ``_PART``: weight of one reading in the mean share of larger spikes.
+# ``_MOST_SPIKES``: mean share above which a sensor is noisy. In independent readings, a
+#   third is higher than both neighbors, and a third is lower.
+_PART, _MOST_SPIKES = 0.1, 0.3
 #: Largest yaw rate at which ranges are checked for noise, rad/s. In a faster turn, the
 #: edges of apertures move along surfaces, so that the ranges change quickly.
 _SLOW_RAD_S = 0.3
@@ -65,8 +66,8 @@ class MonitorNumbers(NamedTuple):
     """
     turn_rad: NDArray[np.float64]
     """(n,) largest turn during which echoes may stay equal, rad."""
-    step_m: NDArray[np.float64]
-    """(n,) largest second difference of a range that motion and noise can cause, m."""
+    spike_m: NDArray[np.float64]
+    """(n,) largest spike of a range that motion and noise can cause, m."""
     tick_s: float
 
 
@@ -90,8 +91,8 @@ class MonitorState(NamedTuple):
     """Number of consecutive equal echoes."""
     heading: NDArray[np.float64]
     """Heading at the first equal echo, rad."""
-    strange: NDArray[np.float64]
-    """Mean share of recent readings that no motion explains."""
+    spikes: NDArray[np.float64]
+    """Mean share of spikes that no motion explains in the recent readings."""
     found: NDArray[np.float64]
     """Number of the last fault."""
     until: NDArray[np.float64]
@@ -103,9 +104,8 @@ def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untype
     """Checks a new echo of sensor ``k`` for the faults frozen and noisy.
 
     A sensor is frozen after too many equal echoes, or if the echoes stay equal while
-    the robot turns far. While the robot turns slowly, a reading is strange if the
-    second difference of the last three ranges is large. A sensor is noisy if too many
-    recent readings are strange.
+    the robot turns far. A sensor is noisy if too many recent readings are large spikes.
+    The check for spikes pauses while the robot turns fast.
 
     Returns:
         Number of the fault, 0 if there is none.
@@ -116,14 +116,16 @@ def _judged(state, k, range_, heading, slow, numbers):  # type: ignore[no-untype
     else:
         state.equal[k], state.heading[k] = 0.0, heading
     if heard > 1.5 and slow:
-        change = range_ - 2.0 * last + state.before[k]
-        strange = 1.0 if abs(change) > numbers.step_m[k] else 0.0
-        state.strange[k] += _PART * (strange - state.strange[k])
+        there, back = last - state.before[k], last - range_
+        is_spike = (
+            there * back > 0.0 and min(abs(there), abs(back)) > numbers.spike_m[k]
+        )
+        state.spikes[k] += _PART * ((1.0 if is_spike else 0.0) - state.spikes[k])
     state.last[k], state.before[k], state.heard[k] = range_, last, heard + 1.0
     turned = abs(heading - state.heading[k])
     if state.equal[k] >= numbers.equal[k] or turned > numbers.turn_rad[k]:
         return _FROZEN
-    return _NOISY if state.strange[k] > _MOST_STRANGE else _NONE
+    return _NOISY if state.spikes[k] > _MOST_SPIKES else _NONE
 
 
 @register_jitable
@@ -173,9 +175,9 @@ class SensingMonitor(Block):
     3. A sensor is frozen: its echoes stay equal. For a sensor with noise, 12 equal
        echoes are a fault. For any sensor, equal echoes are a fault if the robot has
        meanwhile turned by the sensor's aperture plus 0.1 rad.
-    4. A sensor is noisy: more than half of its recent ranges have changed by more than
-       motion and the specified noise can cause. The block makes this check only while
-       the robot turns slowly.
+    4. A sensor is noisy: in more than 30 % of its recent readings, the range has
+       jumped there and back by more than motion and the specified noise can cause. The
+       block makes this check only while the robot turns slowly.
 
     Faults 2 to 4 still count for 2 s after their last detection.
 
@@ -228,7 +230,7 @@ class SensingMonitor(Block):
             max(_ROUNDS * round_s, _SILENT_S),
             np.where(noise_m > 0.0, float(_MOST_EQUAL), math.inf),
             2.0 * np.array(sensors.half_angles) + _BESIDE_RAD,
-            _STEP_M + _STEP_M_S2 * round_s**2 + _SIGMAS * noise_m,
+            _SPIKE_M + _SPIKE_M_S2 * round_s**2 + _SIGMAS * noise_m,
             tick_s,
         )
         sizes = [3, 1] + [sensors.count] * (len(MonitorState._fields) - 2)

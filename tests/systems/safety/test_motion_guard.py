@@ -178,9 +178,10 @@ def test_a_cell_is_known_for_the_way_that_wheel_errors_allow():
         assert state.free_space.rolled_m[0] == pytest.approx(way)
         behind = cell_is_free(state.free_space, -14, 0, way)
         assert behind == (way <= lasts)
-        # Under the body space stays known: the body is there.
-        for x in (way - 0.3, way, way + 0.3):
-            assert cell_is_free(state.free_space, math.floor(x / 0.05), 0, way)
+        # Under the body, 0.35 x 0.82 m, space stays known: the body is there.
+        for x, y in ((way - 0.1, 0.0), (way, -0.3), (way, 0.3), (way + 0.1, 0.0)):
+            cell = math.floor(x / 0.05), math.floor(y / 0.05)
+            assert cell_is_free(state.free_space, *cell, way)
     assert 0.15 < lasts < 0.35
 
 

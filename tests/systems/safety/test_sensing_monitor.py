@@ -132,6 +132,16 @@ def test_stated_noise_and_bodies_that_come_and_go_are_none(noise_m):
         assert watched.tells(ranges, echo=echo) == ("none", 0)
 
 
+def test_bodies_that_enter_and_leave_a_narrow_beam_are_no_noise():
+    """Ten minutes among posts: every look but the second has a step of up to 3 m."""
+    watched, draw = Watched(noise_m=0.01), np.random.default_rng(7)
+    where = np.ones(3)
+    for k in range(24_000):
+        if k % 2 == 0:
+            where = draw.uniform(0.1, 2.9, 3)
+        assert watched.tells(sound_ranges(draw, where, 0.01)) == ("none", 0)
+
+
 def test_in_a_fast_turn_ranges_may_jump():
     """Along fences: edges of apertures run over posts."""
     watched, draw = Watched(), np.random.default_rng(6)
