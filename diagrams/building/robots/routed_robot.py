@@ -36,6 +36,7 @@ def make_trajectory_controller(scenario: Scenario) -> Any:
         parameters=router.gains,
         robot=router.robot,
         adapts=_adapting(router.gains) is not None,
+        narrows=router.gains.zone_narrows,
         tick_s=scenario.tick_s,
     )
 

@@ -24,6 +24,11 @@ class FilteredTrajectoryParameters(TrajectoryImpedanceParameters):
         """Whether contact damping is 0 at the edge of the zone (our choice)."""
         return True
 
+    @property
+    def zone_narrows(self) -> bool:
+        """Whether the zone is at most the clearance of the route (our choice)."""
+        return True
+
 
 TRAJECTORY_FILTERED = trajectory_law(
     "trajectory_filtered",
