@@ -47,7 +47,7 @@ _ARRIVED_M = 0.05
 #: Largest value of the port ``route_clearance``, m.
 _FAR_M = 1e6
 #: Least distance between the side of the body and a known obstacle, m (our choice).
-_BESIDE_M = 0.03
+_BESIDE_M = 0.05
 
 
 class PlannerNumbers(NamedTuple):
@@ -161,7 +161,7 @@ class GlobalPlanner(Block):
     known to move. It remembers at most one point per cell of its grid.
 
     If no route has the desired clearance, the planner accepts less, down to half of the
-    width of the body plus 3 cm. The output ``route_clearance`` is the distance from
+    width of the body plus 5 cm. The output ``route_clearance`` is the distance from
     obstacles at the route's point nearest to P. It includes all obstacles that the
     planner knew when it made the route.
 

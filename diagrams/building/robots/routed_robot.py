@@ -54,7 +54,9 @@ def trajectory_command(scenario: Scenario) -> Any | None:
         filters = own.safety_filter
     if not filters:
         return None
-    return SafetyFilter(robot=router.robot, tick_s=scenario.tick_s)
+    return SafetyFilter(
+        robot=router.robot, known=scenario.mapped(), tick_s=scenario.tick_s
+    )
 
 
 def routed_blocks(
