@@ -194,9 +194,7 @@ def _join_rests(
             reach = 0.5 * (length + width) + radius + _JOINED_M
             if dx * dx + dy * dy < reach * reach:
                 box = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
-                near = nearest_point_on_rectangle(
-                    (x, y), (*box, length, width, radius)
-                )
+                near = nearest_point_on_rectangle((x, y), (*box, length, width, radius))
                 joined = math.hypot(near[0], near[1]) < _JOINED_M
         if joined:
             slot[THERE] = 0.0
