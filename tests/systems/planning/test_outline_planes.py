@@ -1,4 +1,4 @@
-"""Gaps and speeds of approach of the outline against points on edges and small motions."""
+"""The outline against points on edges, and against small motions of the body."""
 
 from __future__ import annotations
 
@@ -47,9 +47,8 @@ def test_a_plane_limits_the_speed_at_which_the_gap_shrinks():
     draw, counted, T = np.random.default_rng(6), 0, 1e-5
     for _ in range(200):
         pose = np.array([*draw.uniform(-0.2, 0.2, 2), draw.uniform(-3, 3)])
-        box = np.array(
-            [*draw.uniform(-0.8, 0.8, 2), 0.3, *draw.uniform(0.1, 0.4, 2), 0]
-        )
+        place, size = draw.uniform(-0.8, 0.8, 2), draw.uniform(0.1, 0.4, 2)
+        box = np.array([*place, 0.3, *size, 0.0])
         body = np.array([*pose, OUTLINE.length_m, OUTLINE.width_m, 0.0])
         gap = outline_gap(body, box)[0]
         planes = outline_planes(pose, NOTHING, box[None], OUTLINE)

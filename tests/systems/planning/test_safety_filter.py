@@ -81,9 +81,8 @@ def test_a_wall_is_approached_by_a_share_of_what_is_left():
     far, v = 1.0, 0.0
     for tick in range(400):
         wall = objects_of([1, far, 0.0, 0.0, 0.0, 1])
-        v, aside, slack = filtered_velocity(
-            (0.22, 0.0), (v, 0.0), 0.0, wall, NONE, NUMBERS
-        )
+        given = (0.22, 0.0), (v, 0.0), 0.0, wall, NONE, NUMBERS
+        v, aside, slack = filtered_velocity(*given)
         far -= 0.025 * v
         assert far > KEEP
         assert (aside, slack) == (0.0, 0.0)
@@ -128,9 +127,8 @@ def test_what_crosses_is_let_pass(speed, aside):
         if far - radius > 2.0:
             objects = objects_of()
         wanted = np.array([0.15, -0.5 * at[1]])
-        vx, vy, _ = filtered_velocity(
-            tuple(wanted), tuple(v), 0.0, objects, NONE, NUMBERS
-        )
+        given = tuple(wanted), tuple(v), 0.0, objects, NONE, NUMBERS
+        vx, vy, _ = filtered_velocity(*given)
         v = np.array([vx, vy])
         lagged += (v - lagged) * (1.0 - math.exp(-0.025 / 0.05))
         at, other = at + 0.025 * lagged, other + 0.025 * other_v
@@ -157,9 +155,8 @@ def test_robots_share_the_way_out():
             away = goal - places[k]
             wanted = 0.15 * away / max(np.hypot(*away), 0.15)
             v = tuple(velocities[k])
-            found.append(
-                filtered_velocity(tuple(wanted), v, 0.0, objects, NONE, NUMBERS)[:2]
-            )
+            given = tuple(wanted), v, 0.0, objects, NONE, NUMBERS
+            found.append(filtered_velocity(*given)[:2])
         velocities = np.array(found)
         places = places + 0.025 * velocities
         least = min(least, np.hypot(*(places[0] - places[1])) - radius)
@@ -173,9 +170,8 @@ def test_the_block_does_not_wind_up():
     state = list(step.state)
     wall = objects_of([1, KEEP, 0.0, 0.0, 0.0, 1]).tolist()
     for _ in range(200):
-        step.step(
-            0, state, ([2.5, 0.0], [0.0, 0.0, 0.0], wall, [1.0]), (), step.numbers
-        )
+        inputs = [2.5, 0.0], [0.0, 0.0, 0.0], wall, [1.0]
+        step.step(0, state, inputs, (), step.numbers)
     assert state[:4] == pytest.approx([0.0] * 4, abs=1e-12)
     assert state[4:] == [0.0, 1.0]
     clear = [0.0] * 64
