@@ -54,7 +54,8 @@ class ImpedanceParameters(Parameters):
     security_zone_m: Length | None = None
     """Distance S from the control point P at which contacts begin, m. With null, the
     distance is 0.8 m for the law ``trajectory_filtered`` (our choice) and 1 m for other
-    laws (tables 1 and 2)."""
+    laws (tables 1 and 2). With ``trajectory_filtered``, the clearance of the route near
+    P limits the distance."""
     block_distance_m: Length | None = None
     """Distance L_block of eq. 6 of Engelbrecht 2021, m. With null, eq. 6 is off.
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
+from numpy.typing import ArrayLike, NDArray
 
 from systems.base.robot import RobotParameters, body_radius
 from systems.base.wheel_speed_command import (
@@ -17,20 +18,31 @@ from systems.base.wheel_speed_command import (
     integrate_velocity,
     limited_wheel_speeds,
 )
-from systems.framework.block import Block, Port, Step
+from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.signals import TICK_S
-from systems.planning.velocity_filter import FilterNumbers, filtered_velocity
+from systems.planning.outline_planes import BodyOutline, outline_planes
+from systems.planning.velocity_filter import (
+    FilterNumbers,
+    filtered_velocity,
+    objects_at_rest,
+)
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 #: Distance between objects and the disc around the axle that contains the body, m (our
 #: choice). The lag of the motors uses up to 1 cm of this distance.
 _MARGIN_M = 0.05
+#: The route is narrow if its clearance exceeds the distance that P keeps from objects
+#: by less than this, m (our choice).
+_NARROW_M = 0.05
 
 
 class SafetyNumbers(NamedTuple):
     """Constants of the step of ``SafetyFilter``."""
 
     limits: FilterNumbers
+    outline: BodyOutline
+    known: NDArray[np.float64]
+    """(k, 6) rectangles of known obstacles in W."""
     robot: RobotParameters
     tick_s: float
 
@@ -46,14 +58,23 @@ def safety_filter_step(
     otherwise 0. The results are the state of the block, and apply to the next control
     period.
     """
-    acceleration, pose, objects = inputs
+    acceleration, pose, objects, route_clearance = inputs
     robot, theta = numbers.robot, pose[2]
     before = state[2], state[3]
     wanted = integrate_velocity(
         before, acceleration, numbers.tick_s, robot.top_speed_m_s
     )
+    objects = np.asarray(objects)
+    planes = np.empty((0, 3))
+    if route_clearance[0] < numbers.limits.keep_m + _NARROW_M:
+        planes = outline_planes(
+            (pose[0], pose[1], theta),
+            objects_at_rest(objects),
+            numbers.known,
+            numbers.outline,
+        )
     vx, vy, slack = filtered_velocity(
-        wanted, before, theta, np.asarray(objects), numbers.limits
+        wanted, before, theta, objects, planes, numbers.limits
     )
     v, omega = hand_position_twist((vx, vy), theta, robot.control_point_m)
     state[0], state[1] = limited_wheel_speeds(v, omega, robot)
@@ -80,6 +101,11 @@ class SafetyFilter(Block):
     The block replaces ``WheelCommand``. The virtual mass moves with the velocity that
     the filter returns, which prevents windup.
 
+    Usually P keeps from objects at rest the distance at which the body can turn freely.
+    Where the clearance of the route is hardly more or even less, the outline of the
+    body keeps 2 cm from known obstacles and from the sensed objects. The planner takes
+    such routes only through passages that are wide enough for the body.
+
     The port ``filter_report`` has two numbers. The first is the slack: the speed by
     which the velocity violates constraints, m/s. The second is 1 if the filter has
     changed the velocity, and 0 otherwise.
@@ -91,6 +117,8 @@ class SafetyFilter(Block):
 
     Args:
         robot: Dimensions and top speed.
+        known: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
+            radius) in the world frame W, m and rad.
         tick_s: Control period, s.
 
     Reference: our own work; half planes of van den Berg and others (2011). Eq. 6 of
@@ -107,6 +135,7 @@ class SafetyFilter(Block):
             OBJECT_SLOTS * OBJECT_SIZE,
             "number, m and m/s in eight slots, see systems.ranging.objects",
         ),
+        Port("route_clearance", 1, "m"),
     )
     outputs = (
         Port("wheel_speeds", 2, "rad/s, left and right", WHEEL_SPEED_COLUMNS),
@@ -118,6 +147,7 @@ class SafetyFilter(Block):
         self,
         *,
         robot: RobotParameters = RobotParameters(),
+        known: ArrayLike = (),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
@@ -128,7 +158,14 @@ class SafetyFilter(Block):
             robot.top_speed_m_s,
             robot.wheel_separation_m / (2.0 * epsilon),
         )
-        numbers = SafetyNumbers(limits, robot, tick_s)
-        self.declare(
-            Step(safety_filter_step, numbers, [0.0] * 6, _publish), tick_s=tick_s
-        )
+        outline = BodyOutline(robot.length_m, robot.width_m, epsilon)
+        rectangles: NDArray[np.float64] = np.array(known, dtype=float).reshape(-1, 6)
+        numbers = SafetyNumbers(limits, outline, rectangles, robot, tick_s)
+        step = Step(safety_filter_step, numbers, [0.0] * 6, _publish)
+        self._step = step
+        self.declare(step, tick_s=tick_s)
+
+    def step_for(self, run: RunFacts) -> Step:
+        """Returns the step with the map of the run."""
+        known: NDArray[np.float64] = np.array(run.mapped, dtype=float).reshape(-1, 6)
+        return self._step._replace(numbers=self._step.numbers._replace(known=known))

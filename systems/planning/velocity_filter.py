@@ -120,8 +120,31 @@ def wheel_planes(
 
 
 @njit(cache=True)
+def _moves(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
+    """Returns whether an object is known to move."""
+    speed = math.hypot(objects[at + VX], objects[at + VY])
+    return bool(objects[at + KNOWN] > 0.5 and speed > _RESTS_M_S)
+
+
+@njit(cache=True)
+def objects_at_rest(objects: Any) -> Any:  # pragma: no cover  (compiled)
+    """Returns a copy of the port ``objects_W`` without robots and moving objects."""
+    resting = objects.copy()
+    for slot in range(OBJECT_SLOTS):
+        at = slot * OBJECT_SIZE
+        if objects[at + ROBOT] > 0.5 or _moves(objects, at):
+            resting[at + THERE] = 0.0
+    return resting
+
+
+@njit(cache=True)
 def filtered_velocity(
-    wanted: Any, v_WP: Any, theta: float, objects: Any, numbers: FilterNumbers
+    wanted: Any,
+    v_WP: Any,
+    theta: float,
+    objects: Any,
+    outline: Any,
+    numbers: FilterNumbers,
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Changes a wanted velocity of P as little as possible to avoid objects.
 
@@ -147,14 +170,24 @@ def filtered_velocity(
         v_WP: Present velocity (x, y) of P in the world frame W, m/s.
         theta: Heading of the robot, rad.
         objects: Objects in the format of the port ``objects_W``.
+        outline: (n, 3) half planes of ``outline_planes``. They replace those of the
+            objects at rest; without such planes, P keeps its distance from them.
         numbers: Distances and limits.
 
     Returns:
         Velocity x, m/s; velocity y, m/s; and slack, m/s.
     """
     # Soft planes come first, then hard planes. A robot at rest obeys all hard planes.
-    planes, used = np.empty((2 * OBJECT_SLOTS + 4, 3)), 0
-    kept, resting = np.empty((OBJECT_SLOTS, 3)), 0
+    most = OBJECT_SLOTS + len(outline)
+    planes, used = np.empty((2 * most + 4, 3)), 0
+    kept, resting = np.empty((most, 3)), 0
+    for k in range(len(outline)):
+        kept[resting] = outline[k]
+        kept[resting, 2] = min(outline[k, 2], 0.0)
+        resting += 1
+        if outline[k, 2] > 0.0:
+            planes[used] = outline[k]
+            used += 1
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE
         x, y, radius = objects[at + X], objects[at + Y], objects[at + RADIUS]
@@ -164,8 +197,7 @@ def filtered_velocity(
         nx, ny = -x / distance, -y / distance
         vx, vy = objects[at + VX], objects[at + VY]
         is_robot = objects[at + ROBOT] > 0.5
-        moves = objects[at + KNOWN] > 0.5 and math.hypot(vx, vy) > _RESTS_M_S
-        if moves or is_robot:
+        if is_robot or _moves(objects, at):
             # A moving object or a robot counts as a disc behind its nearest point.
             center = x - radius * nx, y - radius * ny
             relative = v_WP[0] - vx, v_WP[1] - vy
@@ -178,6 +210,8 @@ def filtered_velocity(
             )
             share = 0.5 if is_robot else 1.0
             offset = nx * v_WP[0] + ny * v_WP[1] + share * inside
+        elif len(outline) > 0:
+            continue
         else:
             # An object at rest. A hard plane limits the approach. If the object is too
             # near, a soft plane also requires P to move away.

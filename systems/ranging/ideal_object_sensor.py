@@ -41,6 +41,10 @@ from systems.world.geometry import (
 _LONG = 2.0
 #: A body whose speed is below this is at rest, m/s.
 _RESTS_M_S = 1e-9
+#: Bodies at rest nearer to each other than this are parts of one obstacle, m (our
+#: choice). No robot fits between them, and steps of a slanted wall of a map count as
+#: one wall.
+_JOINED_M = 0.12
 #: A body blocks a line of sight that passes within this distance, m.
 _GRAZE_M = 1e-6
 
@@ -151,6 +155,54 @@ def _is_blocked(
 
 
 @njit(cache=True)
+def _rests(slot: Any) -> bool:  # pragma: no cover  (compiled)
+    """Returns whether an object has no velocity and is not a robot."""
+    return bool(slot[VX] == 0.0 and slot[VY] == 0.0 and slot[ROBOT] == 0.0)
+
+
+@njit(cache=True)
+def _join_rests(
+    slots: Any, p_WP: Any, poses: Any, sizes: Any
+) -> None:  # pragma: no cover  (compiled)
+    """Leaves one object where rectangles at rest meet.
+
+    The function removes an object whose nearest point is within ``_JOINED_M`` of a
+    rectangle that is nearer to P. What remains are the points at which the distance
+    from all obstacles at rest has a local minimum. They do not depend on how a wall is
+    cut into rectangles. ``slots`` is modified in place.
+    """
+    order, away = np.empty(len(slots), dtype=np.int64), np.empty(len(slots))
+    count = 0
+    for k in range(len(slots)):
+        if slots[k, THERE] > 0.5 and _rests(slots[k]):
+            order[count] = k
+            away[count] = math.hypot(slots[k, X], slots[k, Y])
+            count += 1
+    order = order[:count][np.argsort(away[:count], kind="mergesort")]
+    left = 0
+    for a in range(count):
+        slot = slots[order[a]]
+        # The port has no room for farther objects.
+        joined = left >= OBJECT_SLOTS
+        x, y = p_WP[0] + slot[X], p_WP[1] + slot[Y]
+        for b in range(a):
+            if joined:
+                break
+            k = order[b]
+            dx, dy = poses[3 * k] - x, poses[3 * k + 1] - y
+            length, width, radius = sizes[3 * k], sizes[3 * k + 1], sizes[3 * k + 2]
+            reach = 0.5 * (length + width) + radius + _JOINED_M
+            if dx * dx + dy * dy < reach * reach:
+                box = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
+                near = nearest_point_on_rectangle((x, y), (*box, length, width, radius))
+                joined = math.hypot(near[0], near[1]) < _JOINED_M
+        if joined:
+            slot[THERE] = 0.0
+        else:
+            left += 1
+
+
+@njit(cache=True)
 def _seen(
     state: Any, pose: Any, poses: Any, sizes: Any, numbers: ObjectNumbers
 ) -> Any:  # pragma: no cover  (compiled)
@@ -174,10 +226,15 @@ def _seen(
         slot[ROBOT] = 1.0 if numbers.robots[k] else 0.0
         away = math.hypot(slot[X], slot[Y])
         hidden = numbers.occlusion and _is_hidden(k, p_WP, slot, poses, sizes, owners)
-        # Only the nearest visible rectangle of each body remains.
+        # Only the nearest visible rectangle of each moving body remains.
         if not goes_on:
             nearest, first = np.inf, -1
-        if hidden or away > numbers.maximum_range_m or away >= nearest:
+        if hidden or away > numbers.maximum_range_m:
+            slot[:] = 0.0
+            continue
+        if _rests(slot):
+            continue
+        if away >= nearest:
             slot[:] = 0.0
             continue
         if first >= 0:
@@ -185,6 +242,7 @@ def _seen(
         nearest, first = away, k
     state[0] = 1.0
     state[1 : 1 + 3 * count] = poses
+    _join_rests(slots, p_WP, poses, sizes)
     return nearest_objects(slots)
 
 
@@ -228,6 +286,9 @@ class IdealObjectSensor(Block):
     vector from P to a point, which depends on the body:
 
     - Body at rest: the point is the nearest point of the body. The velocity is zero.
+      Bodies at rest, and parts of them, that are less than 12 cm apart count as one
+      obstacle. This obstacle has an object wherever its distance from P has a local
+      minimum. Therefore the objects do not depend on how a wall is cut into pieces.
     - Moving body: the block replaces the body by the smallest disc that contains it and
       has the same center. The point is the nearest point of the disc. The velocity is
       that of the center.

@@ -15,13 +15,16 @@ from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.occupancy_grid import OccupancyGrid, block_discs, map_grid
+from systems.routes.occupancy_grid import OccupancyGrid, free_grid
 from systems.routes.parameters import RouteParameters
 from systems.routes.route import (
+    ROUTE_POINTS,
     ROUTE_SIZE,
     ROUTE_UNIT,
+    clearances_to_try,
+    fill_clearances,
     fill_route,
-    find_route,
+    find_widest_route,
     plan_route,
 )
 from systems.routes.seen_points import (
@@ -33,24 +36,30 @@ from systems.routes.seen_points import (
 from systems.world.geometry import control_point
 
 #: Indices of ``PlannerState.progress``. REPLANS: number of new routes. SINCE_S: time of
-#: the last advance of P, s. FROM_M: arc length of P at that time, m.
-REPLANS, SINCE_S, FROM_M = range(3)
+#: the last advance of P, s. FROM_M: arc length of P at that time, m. CLEARANCE_M:
+#: clearance of the route near P, m.
+REPLANS, SINCE_S, FROM_M, CLEARANCE_M = range(4)
 #: The robot stalls if P advances along the route by less than ``_STALL_M``, m, within
 #: ``_STALLED_S``, s.
 _STALL_M, _STALLED_S = 0.1, 6.0
 #: Distance from the goal within which the robot has arrived and does not stall, m.
-_ARRIVED_M = 0.15
+_ARRIVED_M = 0.05
+#: Largest value of the port ``route_clearance``, m.
+_FAR_M = 1e6
+#: Least distance between the side of the body and a known obstacle, m (our choice).
+_BESIDE_M = 0.05
 
 
 class PlannerNumbers(NamedTuple):
     """Constants of the step of ``GlobalPlanner``."""
 
     grid: OccupancyGrid
-    """Grid in which the cells too near to known obstacles are blocked."""
+    """Grid of free cells that covers the floor."""
     rectangles: NDArray[np.float64]
     """(k, 6) rectangles of known obstacles in W."""
     goal: tuple[float, float]
-    clearance_m: float
+    clearances: NDArray[np.float64]
+    """(n,) clearances that the planner tries in this order, m."""
     replans: bool
     """Whether the planner makes new routes."""
     control_point_m: float
@@ -63,21 +72,45 @@ class PlannerState(NamedTuple):
 
     route: NDArray[np.float64]
     """(ROUTE_SIZE,) value of the port ``route``."""
+    clearances: NDArray[np.float64]
+    """(ROUTE_POINTS,) distance of each point of the route from obstacles, m."""
     progress: NDArray[np.float64]
-    """(3,) values at ``REPLANS``, ``SINCE_S`` and ``FROM_M``."""
+    """(4,) values at ``REPLANS``, ``SINCE_S``, ``FROM_M`` and ``CLEARANCE_M``."""
     seen: SeenPoints
 
 
 @njit(cache=True)
-def _find_route_again(
-    numbers: PlannerNumbers, seen: SeenPoints, objects: Any, p_WP: tuple[float, float]
-) -> Any:  # pragma: no cover  (compiled)
+def _plan_again(
+    numbers: PlannerNumbers,
+    state: PlannerState,
+    objects: Any,
+    p_WP: tuple[float, float],
+) -> bool:  # pragma: no cover  (compiled)
     """Plan a route from P past known obstacles, seen points and robots at rest."""
-    grid, clearance = numbers.grid, numbers.clearance_m
-    discs = discs_to_avoid(seen, objects, p_WP)
-    now = OccupancyGrid(grid.blocked.copy(), grid.low)
-    block_discs(now, discs, clearance)
-    return find_route(now, p_WP, numbers.goal, numbers.rectangles, discs, clearance)
+    discs = discs_to_avoid(state.seen, objects, p_WP)
+    points = find_widest_route(
+        numbers.grid, p_WP, numbers.goal, numbers.rectangles, discs, numbers.clearances
+    )
+    if len(points) == 0:
+        return False
+    fill_route(state.route, points)
+    fill_clearances(state.clearances, points, numbers.rectangles, discs)
+    return True
+
+
+@njit(cache=True)
+def _clearance_at(
+    state: PlannerState, along: float
+) -> float:  # pragma: no cover  (compiled)
+    """Returns the clearance at an arc length of the route, m, interpolated."""
+    last = int(state.route[0]) - 1
+    place = min(max(along / state.route[1], 0.0), float(last))
+    k = min(int(place), last - 1)
+    part = place - k
+    if part == 0.0:
+        return float(state.clearances[k])
+    near, far = state.clearances[k], state.clearances[k + 1]
+    return float(near + part * (far - near) if far < np.inf else near)
 
 
 def planner_step(
@@ -88,10 +121,11 @@ def planner_step(
     The planner remembers the objects that the sensors see. If the robot stalls, it
     plans a new route.
     """
-    if not numbers.replans:
-        return
     objects, pose, route_progress = inputs
     seen, progress, reached = state.seen, state.progress, route_progress[1]
+    progress[CLEARANCE_M] = _clearance_at(state, reached)
+    if not numbers.replans:
+        return
     x, y = control_point((pose[0], pose[1], pose[2]), numbers.control_point_m)
     remember_objects(seen, numbers.grid, numbers.rectangles, objects, (x, y))
     time = tick * numbers.tick_s
@@ -103,19 +137,19 @@ def planner_step(
     if time - progress[SINCE_S] < _STALLED_S - 0.5 * numbers.tick_s:
         return
     progress[SINCE_S], progress[FROM_M] = time, reached
-    points = _find_route_again(numbers, seen, objects, (x, y))
-    if len(points) > 0:
-        fill_route(state.route, points)
+    if _plan_again(numbers, state, objects, (x, y)):
         progress[REPLANS] += 1.0
         progress[FROM_M] = 0.0
+        progress[CLEARANCE_M] = state.clearances[0]
 
 
 def _publish_route(state: PlannerState, outputs: Any, numbers: PlannerNumbers) -> None:
     """Copy the state of ``planner_step`` to the outputs."""
-    route, replans = outputs
+    route, replans, clearance = outputs
     for k in range(len(route)):
         route[k] = state.route[k]
     replans[0] = state.progress[REPLANS]
+    clearance[0] = min(state.progress[CLEARANCE_M], _FAR_M)
 
 
 class GlobalPlanner(Block):
@@ -126,7 +160,12 @@ class GlobalPlanner(Block):
     During the run, the planner remembers the nearest points of objects that are not
     known to move. It remembers at most one point per cell of its grid.
 
-    The robot stalls if P advances by less than 10 cm along the route in 6 s. Within 15
+    If no route has the desired clearance, the planner accepts less, down to half of the
+    width of the body plus 5 cm. The output ``route_clearance`` is the distance from
+    obstacles at the route's point nearest to P. It includes all obstacles that the
+    planner knew when it made the route.
+
+    The robot stalls if P advances by less than 10 cm along the route in 6 s. Within 5
     cm of the goal, it does not count as stalled. If the robot stalls, the block plans a
     new route from the position of P. This route also avoids the remembered points and
     robots at rest. If there is no such route, the block keeps the old route and tries
@@ -140,7 +179,7 @@ class GlobalPlanner(Block):
         known: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
             radius) in the world frame W, m and rad.
         initial_pose: (x, y, theta) of the robot at the start in W, m and rad.
-        robot: Position of P on the robot.
+        robot: Width of the body, and position of P on it.
         tick_s: Control period of the robot, s.
 
     Raises:
@@ -163,6 +202,7 @@ class GlobalPlanner(Block):
     outputs = (
         Port("route", ROUTE_SIZE, ROUTE_UNIT),
         Port("replans", 1, "number of new routes", ("replans",)),
+        Port("route_clearance", 1, "m"),
     )
 
     def __init__(
@@ -196,26 +236,32 @@ def _make_step(
 ) -> Step:
     rectangles: NDArray[np.float64] = np.array(known, dtype=float).reshape(-1, 6)
     start = control_point(initial_pose, robot.control_point_m)
+    least_m = 0.5 * robot.width_m + _BESIDE_M
     try:
         route = plan_route(
             start,
             goal,
             rectangles,
             clearance_m=parameters.clearance_m,
+            least_m=least_m,
         )
     except InputError as error:
         field = "start.position_m" if error.field == "start" else error.field
         group = "" if error.field == "start" else "route."
         raise InputError(f"{group}{field}", error.message) from error
-    grid = map_grid([start, goal], rectangles, parameters.clearance_m)
+    grid = free_grid([start, goal], rectangles)
+    clearances = np.full(ROUTE_POINTS, np.inf)
+    fill_clearances(clearances, route.points, rectangles, np.empty((0, 3)))
     numbers = PlannerNumbers(
         grid,
         rectangles,
         goal,
-        parameters.clearance_m,
+        clearances_to_try(parameters.clearance_m, least_m),
         parameters.replan,
         robot.control_point_m,
         tick_s,
     )
-    state = PlannerState(route.numbers, np.zeros(3), make_seen_points(grid))
+    progress: NDArray[np.float64] = np.array([0.0, 0.0, 0.0, clearances[0]])
+    seen = make_seen_points(grid)
+    state = PlannerState(route.numbers, clearances, progress, seen)
     return Step(planner_step, numbers, state, _publish_route)

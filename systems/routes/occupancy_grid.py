@@ -36,17 +36,13 @@ class OccupancyGrid(NamedTuple):
     """Least x and y, m."""
 
 
-def map_grid(
-    points: ArrayLike, rectangles: ArrayLike, clearance_m: float
-) -> OccupancyGrid:
-    """Makes a grid in which the cells near known obstacles are blocked.
+def free_grid(points: ArrayLike, rectangles: ArrayLike) -> OccupancyGrid:
+    """Makes a grid of free cells that covers start, goal and known obstacles.
 
     Args:
         points: (n, 2) start and goal in the world frame W, m.
         rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
             radius) in W, m and rad.
-        clearance_m: A cell is blocked if its middle is nearer to an obstacle than this
-            distance, m.
 
     Returns:
         The grid. It covers all points and obstacles, plus a margin of 2 m.
@@ -58,9 +54,7 @@ def map_grid(
     places = [np.asarray(points, dtype=float), *map(rectangle_outline, boxes)]
     low = np.min([np.min(place, axis=0) for place in places], axis=0) - ARENA_MARGIN_M
     high = np.max([np.max(place, axis=0) for place in places], axis=0) + ARENA_MARGIN_M
-    grid = make_occupancy_grid((*low.tolist(), *high.tolist()))
-    block_rectangles(grid, boxes, clearance_m)
-    return grid
+    return make_occupancy_grid((*low.tolist(), *high.tolist()))
 
 
 def make_occupancy_grid(arena: tuple[float, float, float, float]) -> OccupancyGrid:

@@ -29,9 +29,10 @@ class RouteParameters(Parameters):
     goal_m: Point = (4.0, 0.0)
     """Goal of P in W, m."""
     clearance_m: float = Field(default=0.35, ge=0.15, le=1_000.0)
-    """Planned distance between the route and known obstacles, m. Rounded corners may
-    reduce it to 92 %. The planner's grid has cells of 0.05 m, which are too coarse for
-    less than 0.15 m.
+    """Planned distance between the route and known obstacles, m. Where no route has
+    this distance, the planner accepts less, down to half of the width of the body plus
+    0.05 m. Rounded corners may reduce the distance to 92 %. The planner's grid has
+    cells of 0.05 m, which are too coarse for less than 0.15 m.
     """
     replan: bool = True
     """Whether a stalled robot plans a new route around the obstacles that it has

@@ -20,14 +20,19 @@ from systems.routes.occupancy_grid import (
     CELL_M,
     Discs,
     OccupancyGrid,
+    block_discs,
+    block_rectangles,
     cell_middle,
     cell_of,
-    map_grid,
+    free_grid,
 )
 from systems.world.geometry import beyond_rectangle, segment_clearance
 
 #: Largest number of points of a route.
-ROUTE_POINTS = 200
+ROUTE_POINTS = 1_000
+#: A route has at most ``_USUAL_POINTS`` points, or more if these points would be more
+#: than ``_WIDEST_M``, m, apart.
+_USUAL_POINTS, _WIDEST_M = 200, 0.1
 #: Number of values of the port ``route``: the number of points, the spacing of the
 #: points, and x and y of each point.
 ROUTE_SIZE = 2 + 2 * ROUTE_POINTS
@@ -50,6 +55,8 @@ _ROUNDING_M, _ROUNDING_SHARE = 0.015, 0.05
 _WAY_OUT_M, _WAY_OUT_SHARE = 0.01, 0.03
 #: A goal may be nearer to obstacles than the clearance by this rounding error, m.
 _GRAZE_M = 1e-9
+#: Number of steps from the desired clearance to the least clearance.
+_NARROWINGS = 5
 #: Least distance between start and goal, m.
 _SHORTEST_M = 1e-3
 
@@ -275,7 +282,8 @@ def _rounded(
         line = fine
         for _ in range(_AVERAGES):
             line = _averaged(line, half)
-        route = _spaced(line, min(count, ROUTE_POINTS))
+        most = max(_USUAL_POINTS, math.ceil(_length(line) / _WIDEST_M) + 1)
+        route = _spaced(line, min(count, most, ROUTE_POINTS))
         if _line_clearance(route, rectangles, discs, clearance) >= least:
             break
     return route
@@ -377,6 +385,73 @@ def find_route(
     return _rounded(pulled, rectangles, discs, clearance)
 
 
+def clearances_to_try(clearance_m: float, least_m: float) -> NDArray[np.float64]:
+    """Returns clearances from the desired to the least, in the order of the attempts.
+
+    Args:
+        clearance_m: Desired clearance, m.
+        least_m: Least clearance, m. From ``clearance_m`` on, only that one counts.
+
+    Returns:
+        (n,) clearances, m, descending.
+    """
+    if least_m >= clearance_m:
+        return np.array([clearance_m])
+    return np.linspace(clearance_m, least_m, _NARROWINGS + 1)
+
+
+@njit(cache=True)
+def find_widest_route(
+    free: OccupancyGrid,
+    start: tuple[float, float],
+    goal: tuple[float, float],
+    rectangles: Any,
+    discs: Discs,
+    clearances: Any,
+) -> Any:  # pragma: no cover  (compiled)
+    """Finds a route with the first of several clearances that permits one.
+
+    Args:
+        free: Grid without blocked cells. It covers start, goal and obstacles.
+        start: (x, y) in the world frame W, m.
+        goal: (x, y) in W, m.
+        rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
+            radius) in W, m and rad.
+        discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
+        clearances: (c,) clearances to try, m.
+
+    Returns:
+        (p, 2) points in W, m, see ``find_route``. The array is empty if there is no
+        route.
+    """
+    points = np.empty((0, 2))
+    for clearance in clearances:
+        grid = OccupancyGrid(free.blocked.copy(), free.low)
+        block_rectangles(grid, rectangles, clearance)
+        block_discs(grid, discs, clearance)
+        points = find_route(grid, start, goal, rectangles, discs, clearance)
+        if len(points) > 0:
+            break
+    return points
+
+
+@njit(cache=True)
+def fill_clearances(
+    clearances: Any, points: Any, rectangles: Any, discs: Discs
+) -> None:  # pragma: no cover  (compiled)
+    """Computes the distance of each point of a route from the nearest obstacle.
+
+    Args:
+        clearances: (ROUTE_POINTS,) array that receives the distances, m.
+        points: (n, 2) points of the route in the world frame W, m.
+        rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
+            radius) in W, m and rad.
+        discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
+    """
+    for k in range(len(points)):
+        clearances[k] = place_clearance(points[k, 0], points[k, 1], rectangles, discs)
+
+
 @njit(cache=True)
 def _with_corners(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
     """Return points along a polyline, including the vertices of the polyline."""
@@ -399,6 +474,7 @@ def plan_route(
     rectangles: ArrayLike,
     *,
     clearance_m: float = 0.35,
+    least_m: float = np.inf,
 ) -> Route:
     """Plans a short and smooth route for the center of a disc-shaped robot.
 
@@ -412,8 +488,11 @@ def plan_route(
        shorter.
 
     The route keeps at least 92 % of the clearance from all known obstacles. A route
-    longer than 30 m may come nearer at sharp corners, because its ``ROUTE_POINTS``
+    longer than 150 m may come nearer at sharp corners, because its ``ROUTE_POINTS``
     points are then too far apart.
+
+    If no route has the desired clearance, the function plans with less, in
+    ``_NARROWINGS`` equal steps down to ``least_m``.
 
     Args:
         start: (x, y) in the world frame W, m. If the start is nearer to an obstacle
@@ -422,6 +501,8 @@ def plan_route(
         rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
             radius) in W, m and rad.
         clearance_m: Desired distance from known obstacles, m.
+        least_m: Least permitted distance from known obstacles, m. From ``clearance_m``
+            on, every route has the desired clearance.
 
     Returns:
         The route.
@@ -440,11 +521,14 @@ def plan_route(
     start = float(start[0]), float(start[1])
     goal = float(goal[0]), float(goal[1])
     off = place_clearance(*goal, known, discs)
-    if off < clearance_m - _GRAZE_M:
+    clearances = clearances_to_try(clearance_m, least_m)
+    least_m = float(clearances[-1])
+    lower = "lower clearance_m" if least_m == clearance_m else "take a narrower robot"
+    if off < least_m - _GRAZE_M:
         raise InputError(
             "goal_m",
-            f"{_text(goal)} lies {_where(off)}, and clearance_m is {clearance_m:g}; "
-            "move it, or lower clearance_m",
+            f"{_text(goal)} lies {_where(off)}, and the route needs {least_m:.3g} m; "
+            f"move it, or {lower}",
         )
     if place_clearance(*start, known, discs) <= 0.0:
         raise InputError(
@@ -453,14 +537,13 @@ def plan_route(
         )
     if math.dist(start, goal) < _SHORTEST_M:
         raise InputError("goal_m", f"{_text(goal)} is where P starts; move it")
-    grid = map_grid([start, goal], known, clearance_m)
-    points = find_route(grid, start, goal, known, discs, clearance_m)
+    grid = free_grid([start, goal], known)
+    points = find_widest_route(grid, start, goal, known, discs, clearances)
     if not len(points):
         raise InputError(
             "goal_m",
             f"no route leads from {_text(start)} to {_text(goal)} at "
-            f"{clearance_m:g} m from the known obstacles; move start or goal, or "
-            "lower clearance_m",
+            f"{least_m:.3g} m from the known obstacles; move start or goal, or {lower}",
         )
     return Route(points)
 

@@ -36,6 +36,7 @@ def make_trajectory_controller(scenario: Scenario) -> Any:
         parameters=router.gains,
         robot=router.robot,
         adapts=_adapting(router.gains) is not None,
+        narrows=router.gains.zone_narrows,
         tick_s=scenario.tick_s,
     )
 
@@ -53,7 +54,9 @@ def trajectory_command(scenario: Scenario) -> Any | None:
         filters = own.safety_filter
     if not filters:
         return None
-    return SafetyFilter(robot=router.robot, tick_s=scenario.tick_s)
+    return SafetyFilter(
+        robot=router.robot, known=scenario.mapped(), tick_s=scenario.tick_s
+    )
 
 
 def routed_blocks(

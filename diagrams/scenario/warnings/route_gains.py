@@ -143,6 +143,7 @@ def goal_warnings(
     prefix: str,
     robot: Router,
     resting: Mapping[str, NDArray[np.float64]],
+    known: NDArray[np.float64],
     margin_m: float,
 ) -> list[ScenarioWarning]:
     """Warns if obstacles at rest keep a robot away from its goal.
@@ -161,11 +162,16 @@ def goal_warnings(
     follows the force until the steps are tiny. If the law adapts its gains, their
     initial values count.
 
+    If the zone of the law narrows, S is at most the distance of the goal from known
+    obstacles. Obstacles that the planner learns during the run then do not hold P
+    either, because the planner makes a new route.
+
     Args:
         prefix: Prefix of the robot's fields in messages.
         robot: A robot on a route.
         resting: (n, 6) rectangles (x, y, theta, length, width, radius) of each obstacle
             at rest, by name, in the world frame W, m and rad.
+        known: (k, 6) rectangles of the known obstacles at rest in W, m and rad.
         margin_m: ``stop.goal_margin_m``, the permitted distance from the goal, m.
 
     Returns:
@@ -177,6 +183,11 @@ def goal_warnings(
     own = robot.gains
     zone_m, goal = own.security_zone_m, robot.route.goal_m
     p = np.array(goal)
+    if own.zone_narrows and robot.route.replan:
+        return []
+    if own.zone_narrows:
+        off = [math.hypot(*beyond_rectangle(p, row)) for row in known]
+        zone_m = min([zone_m, *off])
     pull, push = own.stiffness_n_m, own.contact_stiffness_n_m
     pushing: list[str] = []
     for _ in range(_STEPS):

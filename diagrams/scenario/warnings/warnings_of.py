@@ -53,7 +53,8 @@ def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
             found += _of_the_start(prefix, robot, scenario.mapped())
             found += route_warnings(prefix, robot, scenario.tick_s)
             margin_m = scenario.stop.goal_margin_m
-            found += goal_warnings(prefix, robot, _resting(scenario), margin_m)
+            resting, known = _resting(scenario), scenario.mapped()
+            found += goal_warnings(prefix, robot, resting, known, margin_m)
     return tuple(found)
 
 

@@ -24,6 +24,14 @@ class TrajectoryImpedanceParameters(ImpedanceParameters):
         """
         return False
 
+    @property
+    def zone_narrows(self) -> bool:
+        """Whether the zone near P is at most the clearance of the route there.
+
+        If true, obstacles that the planner knows do not push a robot on its route.
+        """
+        return False
+
 
 def trajectory_law(
     name: str,

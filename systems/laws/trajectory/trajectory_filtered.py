@@ -17,11 +17,17 @@ class FilteredTrajectoryParameters(TrajectoryImpedanceParameters):
     """Stiffness K_e to robots and obstacles, N/m (our choice)."""
     security_zone_m: Length = 0.8
     """Distance S from the control point P at which contacts begin, m (our choice).
-    Tables 1 and 2 of the paper have 1 m."""
+    Tables 1 and 2 of the paper have 1 m. The clearance of the route near P limits the
+    distance."""
 
     @property
     def damping_fades(self) -> bool:
         """Whether contact damping is 0 at the edge of the zone (our choice)."""
+        return True
+
+    @property
+    def zone_narrows(self) -> bool:
+        """Whether the zone is at most the clearance of the route (our choice)."""
         return True
 
 

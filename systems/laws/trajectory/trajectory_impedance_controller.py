@@ -77,14 +77,18 @@ def trajectory_numbers(
 
 @register_jitable
 def _command(
-    inputs: Any, impedance: Any, outputs: Any, numbers: TrajectoryNumbers
+    inputs: Any,
+    impedance: Any,
+    contacts: ContactNumbers,
+    outputs: Any,
+    numbers: TrajectoryNumbers,
 ) -> None:
     target, objects, pose, v_WP = inputs[0], inputs[1], inputs[2], inputs[3]
     p_WP = control_point(pose, numbers.control_point_m)
     vx, vy = turned_off_back(target[2], target[3], pose[2], _BACK_M_S)
     moving = target[0], target[1], vx, vy
     ux, uy = target_force(p_WP, v_WP, moving, impedance[0], impedance[1])
-    found = contacts_of_objects(objects, v_WP, numbers.contacts)
+    found = contacts_of_objects(objects, v_WP, contacts)
     fx, fy = contact_force(found, impedance[2], numbers.contact_damping)
     ax, ay = (ux + fx) / numbers.mass, (uy + fy) / numbers.mass
     ax, ay = clamped_velocity(ax, ay, ACCELERATION_LIMIT_M_S2)
@@ -106,7 +110,17 @@ def trajectory_impedance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
 ) -> None:
     """Computes acceleration and forces with K, D, and K_e of the parameters."""
-    _command(inputs, numbers.impedance, outputs, numbers)
+    _command(inputs, numbers.impedance, numbers.contacts, outputs, numbers)
+
+
+@register_jitable
+def narrowed_impedance_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
+) -> None:
+    """Computes acceleration and forces with the zone limited by ``route_clearance``."""
+    zone_m = min(numbers.contacts.begins_m, inputs[4][0])
+    contacts = ContactNumbers(zone_m, zone_m, numbers.contacts.fades)
+    _command(inputs, numbers.impedance, contacts, outputs, numbers)
 
 
 @register_jitable
@@ -114,7 +128,7 @@ def adapted_impedance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
 ) -> None:
     """Computes acceleration and forces with K, D, and K_e of the port ``impedance``."""
-    _command(inputs, inputs[4], outputs, numbers)
+    _command(inputs, inputs[4], numbers.contacts, outputs, numbers)
 
 
 @define_for_scalars("TrajectoryImpedanceController_", __name__)
@@ -147,6 +161,10 @@ def TrajectoryImpedanceController_(T):
         ``impedance`` instead of the parameters. The outputs depend only on the present
         input. There is no state and no latency.
 
+        If ``narrows`` is true, S is at most the value of the input port
+        ``route_clearance``: the distance of the route near P from the obstacles that
+        the planner knows. These obstacles do not push a robot on its route.
+
         At most eight objects count. The sampled loop is unstable if the sum of D_e over
         all contacts exceeds 2M/T (80 N s/m for 1 kg). Therefore another block first
         reduces the points of a scan to a few objects.
@@ -155,6 +173,8 @@ def TrajectoryImpedanceController_(T):
             parameters: ``TrajectoryImpedanceParameters``.
             robot: Virtual mass, top speed, and position of P.
             adapts: Whether there is an input port ``impedance``.
+            narrows: Whether there is an input port ``route_clearance``, without
+                ``adapts``.
             tick_s: Control period, s.
 
         Reference: Engelbrecht, Steyn and Djouani (2021), eq. 1 to 6, with the signs
@@ -187,6 +207,7 @@ def TrajectoryImpedanceController_(T):
             parameters: TrajectoryImpedanceParameters = TrajectoryImpedanceParameters(),
             robot: RobotParameters = RobotParameters(),
             adapts: bool = False,
+            narrows: bool = False,
             tick_s: float = TICK_S,
             converter: Any = None,
         ) -> None:
@@ -198,6 +219,9 @@ def TrajectoryImpedanceController_(T):
                 step = adapted_impedance_step
                 impedance = Port("impedance", 3, "number, K, D and K_e")
                 self.inputs = (*self.inputs, impedance)
+            elif narrows:
+                step = narrowed_impedance_step
+                self.inputs = (*self.inputs, Port("route_clearance", 1, "m"))
             self.declare(Step(step, numbers), tick_s=tick_s)
 
     return Impl

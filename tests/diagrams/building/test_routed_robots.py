@@ -186,3 +186,43 @@ def test_a_start_within_the_clearance_is_told():
     assert warning.message.startswith("P starts 0.12 m from a known obstacle")
     assert "route.clearance_m, 0.35 m" in warning.message
     assert not warnings_of(load_scenario("unknown_block"))
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_goal_beside_walls_is_reached(known):
+    """Walls at 0.3 to 0.6 m beside the goal or ahead of it, on the map or not."""
+    beside = [([1.5, -0.05 - off], [5.0, 0.1]) for off in (0.3, 0.45, 0.6)]
+    ahead = [([3.05 + off, 0.0], [0.1, 1.0]) for off in (0.3, 0.5)]
+    for place, size in beside + ahead:
+        wall = {"waypoints_m": [place], "size_m": size, "name": "wall", "known": known}
+        changes = {"route.goal_m": [3.0, 0.0], "obstacles": [wall]}
+        scenario = load_scenario("unknown_block", changes)
+        assert warnings_of(scenario) == () or place[1] == -0.35
+        result = simulate(scenario, engine="compiled")
+        assert result.cause == "reached", place
+        replans = result.columns["replans"][-1]
+        assert replans == 0 if known else replans <= 2
+
+
+def test_a_wall_may_be_cut_into_pieces():
+    """A wall of 5 m at 0.5 m beside the way, as 1, 3 or 16 obstacles."""
+    ends = []
+    for count in (1, 3, 16):
+        size = 5.0 / count
+        pieces = [
+            {
+                "name": f"piece {k}",
+                "waypoints_m": [[-1.0 + (k + 0.5) * size, -0.55]],
+                "size_m": [size, 0.1],
+                "known": False,
+            }
+            for k in range(count)
+        ]
+        changes = {"obstacles": pieces, "route.replan": False, "duration_s": 20}
+        changes["law"] = "trajectory_conventional"
+        result = simulate(load_scenario("unknown_block", changes), engine="compiled")
+        ends.append(result.vector("p_WP")[:, ::40])
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-6)
+    np.testing.assert_allclose(ends[2], ends[0], atol=1e-6)
+    # The wall pushes P aside.
+    assert np.max(ends[0][1]) > 0.1

@@ -21,6 +21,8 @@ from systems.planning.velocity_filter import (
 BURGER = RobotParameters.model_validate({"preset": "turtlebot3_burger"})
 KEEP = 0.5 * math.hypot(0.138, 0.178) + 0.08 + 0.05
 NUMBERS = FilterNumbers(KEEP, 0.22, 1.0)
+#: No half planes of the outline.
+NONE = np.empty((0, 3))
 
 
 def objects_of(*slots):
@@ -79,7 +81,8 @@ def test_a_wall_is_approached_by_a_share_of_what_is_left():
     far, v = 1.0, 0.0
     for tick in range(400):
         wall = objects_of([1, far, 0.0, 0.0, 0.0, 1])
-        v, aside, slack = filtered_velocity((0.22, 0.0), (v, 0.0), 0.0, wall, NUMBERS)
+        given = (0.22, 0.0), (v, 0.0), 0.0, wall, NONE, NUMBERS
+        v, aside, slack = filtered_velocity(*given)
         far -= 0.025 * v
         assert far > KEEP
         assert (aside, slack) == (0.0, 0.0)
@@ -93,17 +96,17 @@ def test_a_wall_is_approached_by_a_share_of_what_is_left():
 def test_nothing_changes_where_nothing_is_near():
     far = objects_of([1, 1.9, 0.0, 0.0, 0.0, 1])
     for empty in (objects_of(), far):
-        found = filtered_velocity((0.1, 0.05), (0.1, 0.0), 0.3, empty, NUMBERS)
+        found = filtered_velocity((0.1, 0.05), (0.1, 0.0), 0.3, empty, NONE, NUMBERS)
         assert found == pytest.approx((0.1, 0.05, 0.0))
 
 
 def test_inside_it_may_always_leave():
     """And is told to, as far as the wheels can."""
     near = objects_of([1, 0.1, 0.0, 0.0, 0.0, 1])
-    vx, _, slack = filtered_velocity((0.1, 0.0), (0.0, 0.0), 0.0, near, NUMBERS)
+    vx, _, slack = filtered_velocity((0.1, 0.0), (0.0, 0.0), 0.0, near, NONE, NUMBERS)
     assert vx == pytest.approx(-(KEEP - 0.1))
     assert slack == 0.0
-    vx, vy, _ = filtered_velocity((-0.2, 0.02), (0.0, 0.0), 0.0, near, NUMBERS)
+    vx, vy, _ = filtered_velocity((-0.2, 0.02), (0.0, 0.0), 0.0, near, NONE, NUMBERS)
     assert (vx, vy) == pytest.approx((-0.2, 0.02))
 
 
@@ -124,7 +127,8 @@ def test_what_crosses_is_let_pass(speed, aside):
         if far - radius > 2.0:
             objects = objects_of()
         wanted = np.array([0.15, -0.5 * at[1]])
-        vx, vy, _ = filtered_velocity(tuple(wanted), tuple(v), 0.0, objects, NUMBERS)
+        given = tuple(wanted), tuple(v), 0.0, objects, NONE, NUMBERS
+        vx, vy, _ = filtered_velocity(*given)
         v = np.array([vx, vy])
         lagged += (v - lagged) * (1.0 - math.exp(-0.025 / 0.05))
         at, other = at + 0.025 * lagged, other + 0.025 * other_v
@@ -151,7 +155,8 @@ def test_robots_share_the_way_out():
             away = goal - places[k]
             wanted = 0.15 * away / max(np.hypot(*away), 0.15)
             v = tuple(velocities[k])
-            found.append(filtered_velocity(tuple(wanted), v, 0.0, objects, NUMBERS)[:2])
+            given = tuple(wanted), v, 0.0, objects, NONE, NUMBERS
+            found.append(filtered_velocity(*given)[:2])
         velocities = np.array(found)
         places = places + 0.025 * velocities
         least = min(least, np.hypot(*(places[0] - places[1])) - radius)
@@ -165,11 +170,12 @@ def test_the_block_does_not_wind_up():
     state = list(step.state)
     wall = objects_of([1, KEEP, 0.0, 0.0, 0.0, 1]).tolist()
     for _ in range(200):
-        step.step(0, state, ([2.5, 0.0], [0.0, 0.0, 0.0], wall), (), step.numbers)
+        inputs = [2.5, 0.0], [0.0, 0.0, 0.0], wall, [1.0]
+        step.step(0, state, inputs, (), step.numbers)
     assert state[:4] == pytest.approx([0.0] * 4, abs=1e-12)
     assert state[4:] == [0.0, 1.0]
     clear = [0.0] * 64
-    step.step(0, state, ([2.5, 0.0], [0.0, 0.0, 0.0], clear), (), step.numbers)
+    step.step(0, state, ([2.5, 0.0], [0.0, 0.0, 0.0], clear, [1.0]), (), step.numbers)
     assert state[2] == pytest.approx(0.0625)
     assert state[0] == pytest.approx(0.0625 / 0.033)
 
@@ -181,6 +187,7 @@ def test_in_drake_it_is_the_same():
         "acceleration_W": [1.0, 0.5],
         "pose_WB_estimated": [0.0, 0.0, 0.4],
         "objects_W": crossing,
+        "route_clearance": [1.0],
     }
     at, state = Bench(block, **inputs), [0.0] * 6
     for _ in range(5):

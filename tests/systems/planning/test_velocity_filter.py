@@ -24,6 +24,8 @@ BURGER = RobotParameters.model_validate({"preset": "turtlebot3_burger"})
 EPSILON, TOP, LAG_S, TICK_S = 0.08, 0.22, 0.05, 0.025
 KEEP = 0.5 * math.hypot(0.138, 0.178) + EPSILON + 0.05
 NUMBERS = FilterNumbers(KEEP, TOP, 1.0)
+#: No half planes of the outline.
+NONE = np.empty((0, 3))
 
 
 def drawn(seed: int) -> Any:
@@ -96,7 +98,7 @@ def test_it_is_the_optimum_of_300_cases():
         wanted, now, theta, objects = drawn(seed)
         soft, hard = constraints(objects, now, theta)
         *v, slack = filtered_velocity(
-            tuple(wanted), tuple(now), theta, objects.ravel(), NUMBERS
+            tuple(wanted), tuple(now), theta, objects.ravel(), NONE, NUMBERS
         )
         found, least = np.array(v), least_slack(soft, hard)
         assert slack == pytest.approx(least, abs=2e-6)
@@ -161,7 +163,7 @@ def driven(
         away = [nearest_point_on_rectangle(p_WP, tuple(box)) for box in rectangles]
         distances.append([math.hypot(*vector) for vector in away])
         acceleration = 4.0 * (np.array(wish(tick, p_WP)) - state[2:4])
-        inputs = acceleration.tolist(), [x, y, theta], objects[0]
+        inputs = acceleration.tolist(), [x, y, theta], objects[0], [1.0]
         command.step(tick, state, inputs, (), command.numbers)
         commands.append(state[:4])
         for _ in range(5):
@@ -281,7 +283,11 @@ def meeting(starts: Any) -> float:
             sensors[k].step(tick, seen[k], inputs, objects, sensors[k].numbers)
             pull = (4.0 * (courses[k] - states[k][2:4])).tolist()
             commands[k].step(
-                tick, states[k], (pull, pose, objects[0]), (), commands[k].numbers
+                tick,
+                states[k],
+                (pull, pose, objects[0], [1.0]),
+                (),
+                commands[k].numbers,
             )
         for k in range(2):
             share = 1.0 - math.exp(-TICK_S / LAG_S)

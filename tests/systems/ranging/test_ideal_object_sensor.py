@@ -82,9 +82,9 @@ def test_beyond_the_range_nothing_is_seen():
 
 
 def test_eight_of_many_and_the_nearest_first():
-    rows = seen([[0.1, 0.5 + 0.1 * k, 0, 0, 0, 0, 0.05, 0.05] for k in (9, *range(9))])
+    rows = seen([[0.1, 0.5 + 0.18 * k, 0, 0, 0, 0, 0.05, 0.05] for k in (8, *range(8))])
     away = np.hypot(rows[0, :, X], rows[0, :, Y])
-    np.testing.assert_allclose(away, 0.475 + 0.1 * np.arange(8))
+    np.testing.assert_allclose(away, 0.475 + 0.18 * np.arange(8))
 
 
 def test_a_body_hides_what_is_behind_it():

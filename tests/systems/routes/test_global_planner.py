@@ -119,7 +119,7 @@ def run_compiled(steps, boxes, ticks, tick, start=(0.0, 0.0)):
     place, progress, valid = np.zeros(4), np.zeros(2), np.zeros(1)
     (x, y), rows = start, []
     for k in range(ticks):
-        planner.publish(states[0], (route, replans), planner.numbers)
+        planner.publish(states[0], (route, replans, np.zeros(1)), planner.numbers)
         pose, objects = np.array([x - EPSILON, y, 0.0]), objects_at(x, y, boxes)
         outputs = place, progress, valid
         tick(target.step, k, states[1], (route, pose), outputs, target.numbers)
@@ -148,6 +148,57 @@ def test_the_first_route_is_that_of_the_map():
     expected = plan_route((0.0, 0.0), (4.0, 0.0), [WALL]).numbers
     np.testing.assert_array_equal(outputs["route"], expected)
     assert outputs["replans"] == [0.0]
+
+
+def test_the_clearance_is_that_of_the_route_near_p(compiled_tick):
+    """Against the distance from 20,000 points on the edge of the wall."""
+    planner = make(known=[WALL])
+    step = planner.step_for(facts(mapped=[WALL]))
+    route = plan_route((0.0, 0.0), (4.0, 0.0), [WALL])
+    x, y, theta, length, width, _ = WALL
+    along = np.linspace(-0.5, 0.5, 5000)
+    ends = np.full(5000, 0.5)
+    edge = np.concatenate(
+        [
+            np.column_stack(each) * [length, width]
+            for each in ((along, ends), (along, -ends), (ends, along), (-ends, along))
+        ]
+    )
+    c, s = math.cos(theta), math.sin(theta)
+    edge = edge @ [[c, s], [-s, c]] + [x, y]
+    published = []
+    for k in (0, 40, 100, len(route.points) - 1):
+        progress = 0.0, k * route.spacing_m
+        inputs = np.zeros(64), (0.0, 0.0, 0.0), progress
+        compiled_tick(step.step, 0, step.state, inputs, (), step.numbers)
+        out = np.zeros(ROUTE_SIZE), np.zeros(1), np.zeros(1)
+        step.publish(step.state, out, step.numbers)
+        off = np.hypot(*(edge - route.points[k]).T).min()
+        assert out[2][0] == pytest.approx(off, abs=1e-4)
+        published.append(off)
+    # The second one is beside the wall, where the planner keeps 0.35 m.
+    assert min(published) < 0.4
+    assert max(published) > 1.5
+
+
+def test_a_door_is_planned_at_the_width_that_it_has():
+    """A robot of 0.16 m passes a door of 0.5 m, although clearance_m is 0.35."""
+    walls = [(2.0, y, 0.0, 0.1, 2.0, 0.0) for y in (1.25, -1.25)]
+    rooms = [(2.0, y, 0.0, 6.5, 0.1, 0.0) for y in (2.25, -2.25)]
+    ends = [(x, 0.0, 0.0, 0.1, 4.6, 0.0) for x in (-1.2, 5.2)]
+    known = walls + rooms + ends
+    planner = GlobalPlanner(
+        parameters=WAITS,
+        known=known,
+        initial_pose=(-EPSILON, 0.0, 0.0),
+        robot=ROBOT.model_copy(update={"width_m": 0.16}),
+    )
+    route = evaluate(planner)["route"]
+    points = route[2:].reshape(-1, 2)[: int(route[0])]
+    beside = np.interp(2.0, *points.T)
+    assert abs(beside) < 0.25 - 0.08 - 0.05
+    with pytest.raises(InputError, match=r"at 0\.35 m from"):
+        plan_route((0.0, 0.0), (4.0, 0.0), known)
 
 
 def test_it_comes_past_an_unknown_wall_and_compiled_the_same(compiled_tick):
@@ -198,7 +249,7 @@ def test_it_plans_anew_after_6_s_without_way(compiled_tick):
 
 
 def test_who_is_at_the_goal_does_not_stall(compiled_tick):
-    pose = (3.9 - EPSILON, 0.0, 0.0)
+    pose = (3.96 - EPSILON, 0.0, 0.0)
     changed, _ = ticks_of_replans(make(), compiled_tick, np.zeros(64), pose, 600)
     assert not changed
 

@@ -10,7 +10,7 @@ import pytest
 
 from analysis.runs.shortest_path import shortest_path_length
 from systems.framework.input_error import InputError
-from systems.routes.route import ROUTE_POINTS, ROUTE_SIZE, plan_route
+from systems.routes.route import ROUTE_SIZE, plan_route
 from systems.world.geometry import rectangle_corners
 
 CLEARANCE = 0.35
@@ -72,7 +72,7 @@ def test_300_random_maps():
         points = route.points
         assert tuple(points[0]) == start
         assert tuple(points[-1]) == goal
-        assert len(points) <= ROUTE_POINTS
+        assert len(points) <= 200
         steps = np.hypot(*np.diff(points, axis=0).T)
         assert steps.max() <= 1.001 * route.spacing_m
         least.append(sampled_clearance(points, boxes))
@@ -125,14 +125,14 @@ def test_no_route_begins_with_a_way_through_a_thin_wall():
 
 def test_where_nothing_is_in_the_way_it_is_straight():
     route = plan_route((0.0, 0.1), (3.0, -1.7), ROOM)
-    expected = np.linspace((0.0, 0.1), (3.0, -1.7), ROUTE_POINTS)
+    expected = np.linspace((0.0, 0.1), (3.0, -1.7), 200)
     np.testing.assert_allclose(route.points, expected, atol=1e-9)
     assert route.length_m == pytest.approx(math.hypot(3.0, 1.8))
     numbers = route.numbers
     assert numbers.size == ROUTE_SIZE
-    assert numbers[0] == ROUTE_POINTS
-    assert numbers[1] == pytest.approx(math.hypot(3.0, 1.8) / (ROUTE_POINTS - 1))
-    np.testing.assert_array_equal(numbers[2:].reshape(-1, 2), route.points)
+    assert numbers[0] == 200
+    assert numbers[1] == pytest.approx(math.hypot(3.0, 1.8) / 199)
+    np.testing.assert_array_equal(numbers[2:402].reshape(-1, 2), route.points)
 
 
 def test_a_short_route_has_points_every_cm():
