@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from analysis.report.notebook_figure import NotebookFigure
 from analysis.report.palette import COLORS
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from analysis.loops.loop_margins import LoopMargins
 
 #: Kind of a plot, as the package ``control`` names its functions.
@@ -56,7 +58,7 @@ def plot_margins(margins: LoopMargins, kind: PlotKind) -> Figure:
     if kind not in plots:
         raise InputError("kind", f"is {kind!r}; use one of {', '.join(plots)}")
     response = margins.response
-    figure = Figure(figsize=(7.0, 5.6), layout="constrained")
+    figure = NotebookFigure(figsize=(7.0, 5.6), layout="constrained")
     rows = 2 if kind == "bode" else 1
     axes = figure.subplots(rows, squeeze=False, sharex=True)[:, 0]
     system = control.frd(response.L, response.omega, name="L")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 
 import numpy as np
@@ -258,7 +259,10 @@ def test_a_block_with_its_own_state_is_linearized_by_differences(tmp_path, monke
     for name in ("rear_sonar.py", "careful_command.py"):
         (tmp_path / name).write_text(page_file("extending.md", name), "utf-8")
     monkeypatch.chdir(tmp_path)
-    loop = rest(blocks=["rear_sonar.py:RearSonar", "careful_command.py:CarefulCommand"])
+    blocks = {
+        "blocks": ["rear_sonar.py:RearSonar", "careful_command.py:CarefulCommand"]
+    }
+    loop = rest(**blocks)
     said = " ".join(loop.differences())
     assert "block rear_sonar" in said
     assert "block command" in said
@@ -267,6 +271,13 @@ def test_a_block_with_its_own_state_is_linearized_by_differences(tmp_path, monke
     kept = [k for k in range(len(A)) if k not in sonar]
     assert len(kept) == len(expected)
     np.testing.assert_allclose(A[np.ix_(kept, kept)], expected, atol=1e-7)
+    named = page_file("extending.md", "careful_command.py")
+    unnamed = re.sub("    states = .*", "", named)
+    (tmp_path / "careful_command.py").write_text(unnamed, "utf-8")
+    with pytest.raises(
+        ValueError, match="careful_command has no state v_WP_x"
+    ):
+        rest(**blocks)
 
 
 def test_a_block_with_another_period_is_refused_with_a_remedy(own_laws):
