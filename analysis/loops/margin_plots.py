@@ -16,7 +16,7 @@ from systems.framework.input_error import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from analysis.loops.loop_margins import LoopMargins
+    from analysis.loops.margin_results import LoopMargins
 
 #: Kind of a plot, as the package ``control`` names its functions.
 PlotKind = Literal["bode", "nyquist", "nichols"]

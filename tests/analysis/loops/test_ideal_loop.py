@@ -274,9 +274,7 @@ def test_a_block_with_its_own_state_is_linearized_by_differences(tmp_path, monke
     named = page_file("extending.md", "careful_command.py")
     unnamed = re.sub("    states = .*", "", named)
     (tmp_path / "careful_command.py").write_text(unnamed, "utf-8")
-    with pytest.raises(
-        ValueError, match="careful_command has no state v_WP_x"
-    ):
+    with pytest.raises(ValueError, match="careful_command has no state v_WP_x"):
         rest(**blocks)
 
 
