@@ -16,8 +16,6 @@ from systems.framework.input_error import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from analysis.loops.margin_results import LoopMargins
-
 #: Kind of a plot, as the package ``control`` names its functions.
 PlotKind = Literal["bode", "nyquist", "nichols"]
 #: Range of both axes of a Nyquist plot. Integrators lead out of every range.
@@ -35,11 +33,11 @@ class _Mark(NamedTuple):
     color: str
 
 
-def plot_margins(margins: LoopMargins, kind: PlotKind) -> Figure:
+def plot_margins(margins: Any, kind: PlotKind) -> Figure:
     """Plots a loop transfer function and marks the points that determine its margins.
 
     Args:
-        margins: Margins of the loop. An unstable closed loop has no marks.
+        margins: ``LoopMargins``. An unstable closed loop has no marks.
         kind: Kind of the plot.
 
     Returns:
@@ -85,7 +83,7 @@ def plot_margins(margins: LoopMargins, kind: PlotKind) -> Figure:
     return figure
 
 
-def _marks(margins: LoopMargins) -> Iterator[_Mark]:
+def _marks(margins: Any) -> Iterator[_Mark]:
     omega, L = margins.response.omega, margins.response.L
     for gain, name in (
         (margins.gain_increase_margin, "gain up"),
@@ -115,7 +113,7 @@ def _curve(axes: Any, points: int) -> tuple[Any, Any]:
     )
 
 
-def _finish_nyquist(axes: Any, margins: LoopMargins) -> None:
+def _finish_nyquist(axes: Any, margins: Any) -> None:
     """Draws the unit circle and the modulus margin, at the same scale on both axes."""
     axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, ls=":", ec=COLORS["empty"]))
     if margins.stable:
