@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from analysis.loops.ideal_scenarios import (
     require_ideal,
 )
 from analysis.loops.radial_law import radial_law
+from analysis.stability.linear_parts import OPERATING_POINTS
 from diagrams import build_sound_follower, make_simulator
 from diagrams.scenario.scenario import Scenario
 from docs.building.page_code import page_file
@@ -225,6 +227,9 @@ def test_a_law_that_refuses_autodiff_is_linearized_by_differences(own_laws):
     loop = rest(f"{own_laws}:rough")
     (said,) = loop.differences()
     assert "cannot differentiate the law" in said
+    search = SimpleNamespace(scenario=loop.scenario, notes=("another",))
+    notes = OPERATING_POINTS.notes(SimpleNamespace(search=search))
+    assert notes == (said, "another")
     assert rest(f"{own_laws}:smooth").differences() == ()
     law = radial_law(loop.scenario)
     for c, s in ((1.062, 0.0), (1.062, 0.2), (1e-7, 0.2)):
