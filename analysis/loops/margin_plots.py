@@ -27,7 +27,7 @@ _LEVELS_DB = (-60.0, 40.0)
 class _Mark(NamedTuple):
     """A point of the curve that determines a margin."""
 
-    index: int
+    place: int
     """Index of the nearest frequency of the response."""
     text: str
     color: str
@@ -69,11 +69,11 @@ def plot_margins(margins: Any, kind: PlotKind) -> Figure:
         axes[0].set_ylim(*_LEVELS_DB)
     for mark in marks:
         if kind == "nyquist":
-            L = response.L[mark.index]
+            L = response.L[mark.place]
             points = [(L.real, L.imag)]
         else:
             curves = [_curve(each, len(response.omega)) for each in axes]
-            points = [(x[mark.index], y[mark.index]) for x, y in curves]
+            points = [(x[mark.place], y[mark.place]) for x, y in curves]
         for axis, point in zip(axes, points, strict=True):
             axis.plot(*point, "o", color=mark.color, zorder=5, label=mark.text)
     state = "stable" if margins.stable else "unstable"
