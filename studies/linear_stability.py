@@ -16,7 +16,8 @@ from analysis.loops.delay_margin import DELAY_PLACES, DelayedLoop
 from analysis.loops.delayed_run import check_delay_margin
 from analysis.loops.equilibria import find_equilibria, follow_equilibrium
 from analysis.loops.linearization import check_gradient, compare_routes
-from analysis.loops.loop_margins import LoopMargins, all_margins, loop_margins
+from analysis.loops.loop_margins import all_margins, loop_margins
+from analysis.loops.margin_results import LoopMargins
 from analysis.loops.open_loops import DIRECTIONS, BreakPoint, target_loop
 from analysis.loops.operating_points import OperatingPoint, moving_equilibrium
 from analysis.loops.step_response import check_step

@@ -48,6 +48,7 @@ MODULES = (
     "analysis/runs/shortest_path.py",
     "analysis/runs/smoothness.py",
     "analysis/loops/loop_margins.py",
+    "analysis/loops/margin_results.py",
     "analysis/stability/*_parts.py",
     "studies/support/claim_judges.py",
     "studies/claims.py",

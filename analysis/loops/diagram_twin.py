@@ -78,7 +78,7 @@ def by_differences(system: Any) -> bool:
     return isinstance(system, BlockByDifferences)
 
 
-class BlockByDifferences(LeafSystem_[AutoDiffXd]):  # type: ignore[misc]
+class BlockByDifferences(LeafSystem_[AutoDiffXd]):
     """AutoDiffXd form of a block that has none, with derivatives from differences.
 
     Only the elements of state and inputs that carry derivatives are varied. Numbers
@@ -199,9 +199,8 @@ class BlockByDifferences(LeafSystem_[AutoDiffXd]):  # type: ignore[misc]
                 step[k] = STEP * max(1.0, abs(point[k]))
                 slope = (at(point + step) - at(point - step)) / (2.0 * step[k])
                 found += np.outer(slope, gradient[k])
-        return np.array(
-            [AutoDiffXd(*each) for each in zip(here, found, strict=True)], dtype=object
-        )
+        pairs: Any = zip(here, found, strict=True)
+        return np.array([AutoDiffXd(y, slopes) for y, slopes in pairs], dtype=object)
 
 
 def _refuse_objects(block: Any, own: Any) -> None:

@@ -13,7 +13,8 @@ from analysis.loops.diagram_linearization import linearize
 from analysis.loops.diagram_ports import find_source
 from analysis.loops.linear_models import LinearModel
 from analysis.loops.linearized_diagram import LinearizedDiagram
-from analysis.loops.loop_margins import LoopMargins, loop_margins
+from analysis.loops.loop_margins import loop_margins
+from analysis.loops.margin_results import LoopMargins
 from analysis.loops.multiloop_disk import MultiloopDiskMargin, multiloop_disk_margin
 from analysis.loops.response_margins import (
     delayed_response,

@@ -35,11 +35,18 @@ from diagrams.building.robot import parts_of
 from diagrams.running.simulation import simulator_config
 from diagrams.scenario.own_versions import loaded_digests
 from diagrams.scenario.scenario import Scenario
+from systems import DiffDrivePlant, WheelCommand, WheelOdometry
 from systems.framework.input_error import InputError
 
 #: Number of control periods after which the tracker has settled. With exact hearing,
 #: its slowest mode shrinks to 0.27 of its size in each period.
 SETTLING_TICKS = 40
+#: States that the analysis uses, by part. A block that replaces the part has them, too.
+_NAMED = {
+    "plant": DiffDrivePlant.states,
+    "command": WheelCommand.states,
+    "odometry": WheelOdometry.states,
+}
 
 
 @dataclass(frozen=True)
@@ -165,6 +172,14 @@ class IdealLoop:
             size, names = own.num_total_states(), getattr(block, "states", ())
             if len(names) != size:
                 names = tuple(f"state_{k}" for k in range(size))
+            for name in _NAMED.get(part, ()):
+                if name not in names:
+                    raise InputError(
+                        "blocks",
+                        f"{block.get_name()} has no state {name}, and the report needs "
+                        f"the states of the block that it replaces; name them in its "
+                        f"class: states = {_NAMED[part]}",
+                    )
             kind = continuous if own.num_continuous_states() else discrete
             kind.extend(f"{part}.{name}" for name in names)
         return (*continuous, *discrete)

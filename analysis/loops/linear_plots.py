@@ -21,7 +21,7 @@ from analysis.loops.force_field import ForceField
 from analysis.loops.gang_of_four import GangOfFour
 from analysis.loops.ideal_loop import ideal_loop
 from analysis.loops.linear_models import s_plane
-from analysis.loops.loop_margins import FrequencyResponse, LoopMargins
+from analysis.loops.margin_results import FrequencyResponse, LoopMargins
 from analysis.loops.robustness import (
     PoleCloud,
     PoleSensitivity,

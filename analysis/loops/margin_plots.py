@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from analysis.report.notebook_figure import NotebookFigure
 from analysis.report.palette import COLORS
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
-    from analysis.loops.loop_margins import LoopMargins
+    from matplotlib.figure import Figure
 
 #: Kind of a plot, as the package ``control`` names its functions.
 PlotKind = Literal["bode", "nyquist", "nichols"]
@@ -27,17 +27,17 @@ _LEVELS_DB = (-60.0, 40.0)
 class _Mark(NamedTuple):
     """A point of the curve that determines a margin."""
 
-    index: int
+    place: int
     """Index of the nearest frequency of the response."""
     text: str
     color: str
 
 
-def plot_margins(margins: LoopMargins, kind: PlotKind) -> Figure:
+def plot_margins(margins: Any, kind: PlotKind) -> Figure:
     """Plots a loop transfer function and marks the points that determine its margins.
 
     Args:
-        margins: Margins of the loop. An unstable closed loop has no marks.
+        margins: ``LoopMargins``. An unstable closed loop has no marks.
         kind: Kind of the plot.
 
     Returns:
@@ -56,7 +56,7 @@ def plot_margins(margins: LoopMargins, kind: PlotKind) -> Figure:
     if kind not in plots:
         raise InputError("kind", f"is {kind!r}; use one of {', '.join(plots)}")
     response = margins.response
-    figure = Figure(figsize=(7.0, 5.6), layout="constrained")
+    figure = NotebookFigure(figsize=(7.0, 5.6), layout="constrained")
     rows = 2 if kind == "bode" else 1
     axes = figure.subplots(rows, squeeze=False, sharex=True)[:, 0]
     system = control.frd(response.L, response.omega, name="L")
@@ -69,11 +69,11 @@ def plot_margins(margins: LoopMargins, kind: PlotKind) -> Figure:
         axes[0].set_ylim(*_LEVELS_DB)
     for mark in marks:
         if kind == "nyquist":
-            L = response.L[mark.index]
+            L = response.L[mark.place]
             points = [(L.real, L.imag)]
         else:
             curves = [_curve(each, len(response.omega)) for each in axes]
-            points = [(x[mark.index], y[mark.index]) for x, y in curves]
+            points = [(x[mark.place], y[mark.place]) for x, y in curves]
         for axis, point in zip(axes, points, strict=True):
             axis.plot(*point, "o", color=mark.color, zorder=5, label=mark.text)
     state = "stable" if margins.stable else "unstable"
@@ -83,7 +83,7 @@ def plot_margins(margins: LoopMargins, kind: PlotKind) -> Figure:
     return figure
 
 
-def _marks(margins: LoopMargins) -> Iterator[_Mark]:
+def _marks(margins: Any) -> Iterator[_Mark]:
     omega, L = margins.response.omega, margins.response.L
     for gain, name in (
         (margins.gain_increase_margin, "gain up"),
@@ -113,7 +113,7 @@ def _curve(axes: Any, points: int) -> tuple[Any, Any]:
     )
 
 
-def _finish_nyquist(axes: Any, margins: LoopMargins) -> None:
+def _finish_nyquist(axes: Any, margins: Any) -> None:
     """Draws the unit circle and the modulus margin, at the same scale on both axes."""
     axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, ls=":", ec=COLORS["empty"]))
     if margins.stable:

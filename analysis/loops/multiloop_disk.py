@@ -25,7 +25,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from analysis.loops.frequency_levels import frequency_grid
 from analysis.loops.linear_models import LinearModel
-from analysis.loops.loop_margins import DiskMargin
+from analysis.loops.margin_results import DiskMargin
 from systems.framework.input_error import InputError
 
 #: Number of frequencies at which mu is computed first.

@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from analysis.loops.frequency_levels import crossings, frequency_grid
 from analysis.loops.linear_models import LinearModel
-from analysis.loops.loop_margins import (
+from analysis.loops.margin_results import (
     SKEWS,
     DiskMargin,
     FrequencyResponse,

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from analysis.loops.contact_mode import contact_model
 from analysis.loops.linear_models import LinearModel
-from analysis.loops.loop_margins import LoopMargins, loop_margins
+from analysis.loops.loop_margins import loop_margins
+from analysis.loops.margin_results import LoopMargins
 from analysis.routes.route_loop import (
     AXES,
     RoutePoint,

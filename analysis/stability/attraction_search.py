@@ -41,7 +41,8 @@ from analysis.loops.contact_mode import (
 from analysis.loops.equilibria import follow_equilibrium
 from analysis.loops.ideal_scenarios import changed, ideal_scenario
 from analysis.loops.linear_models import LinearModel
-from analysis.loops.loop_margins import LoopMargins, all_margins, loop_margins
+from analysis.loops.loop_margins import all_margins, loop_margins
+from analysis.loops.margin_results import LoopMargins
 from analysis.loops.open_loops import BreakPoint
 from analysis.loops.push_and_pull import DESIGNED_LAWS
 from analysis.loops.radial_law import radial_law

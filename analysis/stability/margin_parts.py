@@ -21,13 +21,8 @@ from analysis.loops.linear_plots import (
     plot_nichols,
     plot_nyquist,
 )
-from analysis.loops.loop_margins import (
-    DiskMargin,
-    LoopMargins,
-    PointMargins,
-    all_margins,
-    loop_margins,
-)
+from analysis.loops.loop_margins import PointMargins, all_margins, loop_margins
+from analysis.loops.margin_results import DiskMargin, LoopMargins
 from analysis.loops.open_loops import BREAK_POINTS, target_loop
 from analysis.loops.operating_points import OperatingPoint
 from analysis.report.criterion import Criterion, Reading

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from analysis.loops.loop_margins import LoopMargins
+from analysis.loops.margin_results import LoopMargins
 from analysis.report.criterion import Criterion, Reading
 from analysis.report.plain_values import pick
 from analysis.report.section import Cell, Column, Content, Figure, Table, number

@@ -29,6 +29,7 @@ def force_with_slopes(
     """
     if not isinstance(c, AutoDiffXd) and not isinstance(s, AutoDiffXd):
         return law(c, s), ""
+    why = ""
     try:
         force = law(c, s)
     except Exception as error:  # noqa: BLE001  # whatever a user's function raises
@@ -38,14 +39,14 @@ def force_with_slopes(
             force = force.item()
         if isinstance(force, AutoDiffXd):
             return force, ""
-        why = f"its force is a {type(force).__name__} without derivatives"
     (at, by), (speed, by_speed) = _parts(c), _parts(s)
     force = float(law(at, speed))
     slope = _slope(lambda x: law(x, speed), at) if np.any(by) else 0.0
     speed_slope = _slope(lambda x: law(at, x), speed) if np.any(by_speed) else 0.0
     if slope == 0.0 == speed_slope:
-        return force, "" if why.startswith("its force") else why
-    return AutoDiffXd(force, np.atleast_1d(slope * by + speed_slope * by_speed)), why
+        return force, why
+    gradient: Any = np.atleast_1d(slope * by + speed_slope * by_speed)
+    return AutoDiffXd(force, gradient), why or "it returns a force without derivatives"
 
 
 def _parts(value: Any) -> tuple[float, Any]:

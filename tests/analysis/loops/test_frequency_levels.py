@@ -22,7 +22,8 @@ from analysis.loops.frequency_levels import frequency_grid, peak
 from analysis.loops.gang_of_four import gang_of_four
 from analysis.loops.heading_loop import heading_loop, heading_loop_margins
 from analysis.loops.linear_models import LinearModel
-from analysis.loops.loop_margins import frequency_response, is_loop, loop_margins
+from analysis.loops.loop_margins import is_loop, loop_margins
+from analysis.loops.margin_results import frequency_response
 from analysis.stability.attraction_search import least_damping
 from analysis.stability.requirements import Requirements
 from diagrams.scenario.scenario import Scenario

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from analysis.loops.ideal_scenarios import (
     require_ideal,
 )
 from analysis.loops.radial_law import radial_law
+from analysis.stability.linear_parts import OPERATING_POINTS
 from diagrams import build_sound_follower, make_simulator
 from diagrams.scenario.scenario import Scenario
 from docs.building.page_code import page_file
@@ -224,6 +227,9 @@ def test_a_law_that_refuses_autodiff_is_linearized_by_differences(own_laws):
     loop = rest(f"{own_laws}:rough")
     (said,) = loop.differences()
     assert "cannot differentiate the law" in said
+    search = SimpleNamespace(scenario=loop.scenario, notes=("another",))
+    notes = OPERATING_POINTS.notes(SimpleNamespace(search=search))
+    assert notes == (said, "another")
     assert rest(f"{own_laws}:smooth").differences() == ()
     law = radial_law(loop.scenario)
     for c, s in ((1.062, 0.0), (1.062, 0.2), (1e-7, 0.2)):
@@ -258,7 +264,10 @@ def test_a_block_with_its_own_state_is_linearized_by_differences(tmp_path, monke
     for name in ("rear_sonar.py", "careful_command.py"):
         (tmp_path / name).write_text(page_file("extending.md", name), "utf-8")
     monkeypatch.chdir(tmp_path)
-    loop = rest(blocks=["rear_sonar.py:RearSonar", "careful_command.py:CarefulCommand"])
+    blocks = {
+        "blocks": ["rear_sonar.py:RearSonar", "careful_command.py:CarefulCommand"]
+    }
+    loop = rest(**blocks)
     said = " ".join(loop.differences())
     assert "block rear_sonar" in said
     assert "block command" in said
@@ -267,6 +276,11 @@ def test_a_block_with_its_own_state_is_linearized_by_differences(tmp_path, monke
     kept = [k for k in range(len(A)) if k not in sonar]
     assert len(kept) == len(expected)
     np.testing.assert_allclose(A[np.ix_(kept, kept)], expected, atol=1e-7)
+    named = page_file("extending.md", "careful_command.py")
+    unnamed = re.sub("    states = .*", "", named)
+    (tmp_path / "careful_command.py").write_text(unnamed, "utf-8")
+    with pytest.raises(ValueError, match="careful_command has no state v_WP_x"):
+        rest(**blocks)
 
 
 def test_a_block_with_another_period_is_refused_with_a_remedy(own_laws):

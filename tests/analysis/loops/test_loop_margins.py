@@ -11,7 +11,8 @@ from hypothesis import given, settings, strategies as st
 
 from analysis.loops.equilibria import follow_equilibrium
 from analysis.loops.linear_models import LinearModel
-from analysis.loops.loop_margins import DiskMargin, all_margins, loop_margins
+from analysis.loops.loop_margins import all_margins, loop_margins
+from analysis.loops.margin_results import DiskMargin
 from analysis.loops.open_loops import closed, cut_model, open_loop, target_loop
 from analysis.loops.operating_points import moving_equilibrium
 from diagrams.scenario.scenario import Scenario
