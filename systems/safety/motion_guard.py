@@ -129,9 +129,10 @@ class MotionGuard(Block):
     moves with the command that the block passes.
 
     If ``obstacle_speed_m_s`` is above zero, the block assumes that obstacles in the
-    sensors' view approach at this speed. The smallest disc around the axle that contains
-    the body then has to stay as far away from all points that these obstacles may reach. This second condition does not
-    apply while the robot withdraws from the obstacles.
+    sensors' view approach at this speed. The smallest disc around the axle that
+    contains the body then has to stay as far away from all points that these obstacles
+    may reach. This second condition does not apply while the robot withdraws from the
+    obstacles.
 
     If the sensing has a fault, the block brakes the robot to rest, whatever the law
     commands.
