@@ -55,12 +55,14 @@ class GuardedController(Block):
     the remaining distance. The robot weaves from side to side, so that its narrow
     sensor cones also see the space beside it.
 
-    Four rules keep the robot from getting stuck:
+    Five rules keep the robot from getting stuck:
 
     - Before the robot first moves, it looks to both sides.
     - If the guard stops the robot, the robot looks past both sides of the cell that
       blocks it. If this cell is still not free, routes avoid it for a time.
-    - If the robot still does not get away, it backs off.
+    - If the robot still does not get away, or if it cannot turn, it backs off. If it
+      cannot back off, it drives ahead for room to turn.
+    - If the guard stops the robot near a target at rest, the robot rests there.
     - If every route of the last 20 s crossed cells with echoes, the robot stops. The
       port ``gives_up`` is then 1 until there is a route without such cells.
 
@@ -76,7 +78,7 @@ class GuardedController(Block):
     - 0: no target
     - 1: driving
     - 2: looking
-    - 3: backing off
+    - 3: backing off, or driving ahead for room to turn
     - 4: no route found
 
     This law needs the guard, because the law alone does not avoid obstacles.

@@ -73,6 +73,11 @@ _DETOUR = 1.15
 # ``_THERE_M``: limit of the error of the distance from the target, m.
 # ``_RESTS_M_S``: limit of the speed of the target, m/s.
 _THERE_M, _RESTS_M_S = 0.2, 0.1
+# The guard may not let the robot come so near to the body of the target. A robot that
+# is nearly there then rests where it is.
+# ``_NEARLY_M``: limit of the error of the distance from the target, m.
+# ``_SETTLE_S``: time for which the robot first tries to come nearer, s.
+_NEARLY_M, _SETTLE_S = 0.4, 3.0
 
 # The heading of the robot weaves, so that the sensor cones sweep over the floor.
 # ``_WEAVE_RAD``: amplitude of weaving to both sides, rad.
@@ -147,6 +152,8 @@ class DriveMemory(NamedTuple):
     """(2,) position of the robot when it last moved on, m."""
     stays_s: NDArray[np.float64]
     """Time when the robot last moved on, s."""
+    settled: NDArray[np.float64]
+    """1 if the robot rests nearly at the follow distance, else 0."""
     has_looked: NDArray[np.float64]
     """1 after the first look around, else 0."""
     headings: NDArray[np.float64]
@@ -381,7 +388,8 @@ def _find_heading(  # type: ignore[no-untyped-def]
        distance counts instead, and a robot close to the target drives directly toward
        it.
     4. Compute the wanted speed from the remaining distance, the follow distance, and
-       the speed at which the target moves away.
+       the speed at which the target moves away. If the robot has arrived at a target
+       that P should reach, the heading error is that of the velocity of P.
 
     Returns:
         Wanted speed, m/s; heading error, rad; and whether the robot has arrived.
@@ -406,7 +414,8 @@ def _find_heading(  # type: ignore[no-untyped-def]
     direct = math.hypot(target[0] - x, target[1] - y)
     left = max(distance, length - offset)
     # A route over cells is longer than the straight line, even without obstacles.
-    if way.dearest[0] <= TIGHT and length < _DETOUR * direct:
+    straight = way.dearest[0] <= TIGHT and length < _DETOUR * direct
+    if straight:
         left = distance
         if distance < follow + 3.0 * _THERE_M:
             carrot = target[0], target[1]
@@ -416,7 +425,19 @@ def _find_heading(  # type: ignore[no-untyped-def]
     wanted = wanted_speed(left - follow, along, numbers.cruise_m_s)
     rests = math.hypot(velocity[0], velocity[1]) < _RESTS_M_S
     m.carrot[0], m.carrot[1], m.way_left_m[0] = carrot[0], carrot[1], left
-    return wanted, wrapped(bearing - theta), rests and abs(left - follow) < _THERE_M
+    there = rests and abs(left - follow) < _THERE_M
+    if follow < offset:
+        # No body is at the target. Beside it, the bearing from the axle says little.
+        if there:
+            bearing = math.atan2(dy, dx)
+        return wanted, wrapped(bearing - theta), there
+    if not (rests and straight and left - follow < _NEARLY_M):
+        m.settled[0] = 0.0
+    elif time - m.stays_s[0] > _SETTLE_S:
+        m.settled[0] = 1.0
+    if m.settled[0] > 0.5:
+        wanted, there = min(wanted, 0.0), True
+    return wanted, wrapped(bearing - theta), there
 
 
 @register_jitable
@@ -511,6 +532,11 @@ def _drive(  # type: ignore[no-untyped-def]
     error is large, the robot turns without driving.
     """
     m = state.memory
+    if there and numbers.follow_distance_m < numbers.control_point_m:
+        # This twist gives P the wanted velocity.
+        m.speed[0] = wanted * math.cos(error)
+        m.turn[0] = wanted * math.sin(error) / numbers.control_point_m
+        return
     if there:
         m.speed[0], m.turn[0] = wanted, 0.5 * TURN_GAIN * error
         return

@@ -119,18 +119,20 @@ class MotionGuard(Block):
 
     The block replaces ``WheelCommand``: it converts the command of the law to wheel
     speeds. It passes these speeds for one control period if the robot could then brake
-    to rest in free space. For this check, the block uses the smallest disc around the
-    axle that contains the body. The disc must stay ``MARGIN_M`` away from all cells
-    that are not known to be free.
+    to rest in free space. For this check, the block uses the lane of the body
+    (``systems.safety.outline``), or the outline alone while the robot turns on the
+    spot. All cells that are not known to be free must stay ``MARGIN_M`` and the
+    position error away.
 
     Otherwise, the block passes lower speeds along the same curve. If these do not help,
-    it passes the turn alone, or it brakes. The virtual mass moves with the command that
-    the block passes.
+    it passes the turn alone or the forward motion alone, or it brakes. The virtual mass
+    moves with the command that the block passes.
 
     If ``obstacle_speed_m_s`` is above zero, the block assumes that obstacles in the
-    sensors' view approach at this speed. The disc then also has to stay ``MARGIN_M``
-    away from all points that these obstacles may reach. This second condition does not
-    apply while the robot withdraws from the obstacles.
+    sensors' view approach at this speed. The smallest disc around the axle that
+    contains the body then has to stay as far away from all points that these obstacles
+    may reach. This second condition does not apply while the robot withdraws from the
+    obstacles.
 
     If the sensing has a fault, the block brakes the robot to rest, whatever the law
     commands.
@@ -138,7 +140,7 @@ class MotionGuard(Block):
     The port ``guard_report`` has four numbers:
 
     - the action: 0 passed, 1 slowed, 2 turned, 3 braked, 4 halted because of a fault
-    - the distance of the disc from non-free space, minus the distance that the disc has
+    - the distance of the lane from non-free space, minus the distance that the lane has
       to keep, m
     - the stopping distance, m
     - the distance of the disc from the end of the sensors' view, minus the distance

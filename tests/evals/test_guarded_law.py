@@ -124,6 +124,43 @@ def test_slower_sensors_enter_all_of_the_map(slower):
     assert run.cause == "reached"
 
 
+EMPTY = ["hearing=ideal_always", "law=guarded", "obstacles=[]", "duration_s=40"]
+AT_ORIGIN = ["start.position_m=[0, 0]", "start.heading_deg=0"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("goal", "nearest_m", "farthest_m"),
+    [
+        ("goal_m=[5, 0]", 0.0, 0.05),
+        ("goal_m=[0.1, 0.15]", 0.0, 0.05),
+        ("source.waypoints_m=[[6.5, 0]]", 0.3, 0.6),
+    ],
+)
+def test_it_comes_to_rest(goal, nearest_m, farthest_m):
+    """P rests on a point, and in the goal of a body near which the guard holds it.
+
+    The goal is the follow distance, 0.3 m, and ``stop.goal_margin_m``, 0.3 m.
+    """
+    follow = [] if "goal_m" in goal else ["attraction.follow_distance_m=0.3"]
+    scenario = load_scenario("default", [*EMPTY, *AT_ORIGIN, goal, *follow])
+    run = simulate(scenario, engine="compiled")
+    assert run.cause == "reached"
+    left = np.hypot(run.columns["p_PS_B_x"][-1], run.columns["p_PS_B_y"][-1])
+    assert nearest_m <= left <= farthest_m
+
+
+@pytest.mark.slow
+def test_where_it_can_neither_turn_nor_back_it_drives_ahead():
+    """The goal is behind, where the scanner has seen nothing, at the corners, too."""
+    jackal = ["robot.preset=jackal", "ultrasonic.preset=lidar_270"]
+    guard = "guard={start_bubble_m: 0, obstacle_speed_m_s: 0}"
+    fields = [*EMPTY, *AT_ORIGIN, "goal_m=[-3, 0]", *jackal, guard]
+    run = simulate(load_scenario("default", fields), engine="compiled")
+    assert run.cause == "reached"
+    assert run.columns["p_WB_x"].max() > 0.05
+
+
 def test_the_law_brings_its_guard():
     scenario = load_scenario("default", ["law=guarded"])
     assert scenario.follower.guard is None
