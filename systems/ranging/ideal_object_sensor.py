@@ -168,8 +168,8 @@ def _join_rests(
 
     The function removes an object whose nearest point is within ``_JOINED_M`` of a
     rectangle that is nearer to P. The other objects are the points at which the
-    distance from all obstacles at rest has a local minimum. They do not depend on how a wall is
-    cut into rectangles. ``slots`` is modified in place.
+    distance from all obstacles at rest has a local minimum. They do not depend on how a
+    wall is cut into rectangles. ``slots`` is modified in place.
     """
     order, away = np.empty(len(slots), dtype=np.int64), np.empty(len(slots))
     count = 0

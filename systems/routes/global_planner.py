@@ -47,8 +47,9 @@ _STALL_M, _STALLED_S = 0.1, 6.0
 _ARRIVED_M = 0.05
 #: Largest value of the port ``route_clearance``, m.
 _FAR_M = 1e6
-#: Least distance between the side of the body and a known obstacle, m (our choice).
-_BESIDE_M = 0.05
+#: Least planned distance between the side of the body and a known obstacle, m (our
+#: choice). With cells of 5 cm, each passage that leaves 5 cm on both sides is found.
+_BESIDE_M = 0.025
 
 
 class PlannerNumbers(NamedTuple):
@@ -170,11 +171,10 @@ class GlobalPlanner(Block):
     known to move. It remembers at most one point per cell of its grid.
 
     If no route has the desired clearance, the planner accepts less, down to half of the
-    width of the body plus 5 cm. From seen obstacles, it keeps the distance at which the
-    body can turn, because it knows only points of them. The output ``route_clearance``
-    is the distance from obstacles at the route's point nearest to P. It includes all
-    obstacles that the
-    planner knew when it made the route.
+    width of the body plus 2.5 cm. From seen obstacles, it keeps the distance at which
+    the body can turn, because it knows only points of them. The output
+    ``route_clearance`` is the distance from obstacles at the route's point nearest to
+    P. It includes all obstacles that the planner knew when it made the route.
 
     The robot stalls if P advances by less than 10 cm along the route in 6 s. Within 5
     cm of the goal, it does not count as stalled. If the robot stalls, the block plans a
