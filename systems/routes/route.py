@@ -453,7 +453,9 @@ def fill_clearances(
         discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
     """
     for k in range(len(points)):
-        clearances[k] = place_clearance(points[k, 0], points[k, 1], rectangles, discs)
+        clearances[k] = _clearance(
+            points[k], points[k], rectangles, discs, -np.inf, np.inf
+        )
 
 
 @njit(cache=True)
