@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from systems.framework.compiling import njit
-from systems.ranging.objects import THERE, X, Y
-from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import corners_of, nearest_point_on_rectangle
 
 #: Distance between the outline and obstacles, m (our choice). The lag of the motors
@@ -78,7 +76,7 @@ def outline_gap(
 
 @njit(cache=True)
 def outline_planes(
-    pose: Any, objects: Any, rectangles: Any, outline: BodyOutline
+    pose: Any, rectangles: Any, outline: BodyOutline
 ) -> Any:  # pragma: no cover  (compiled)
     """Lists the velocities of P at which the outline approaches obstacles slowly.
 
@@ -88,8 +86,6 @@ def outline_planes(
 
     Args:
         pose: (x, y, theta) of the body in the world frame W, m and rad.
-        objects: Objects at rest in the format of the port ``objects_W``. Each counts as
-            a point.
         rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
             radius) in W, m and rad.
         outline: Size of the body, and position of P on it.
@@ -100,19 +96,10 @@ def outline_planes(
     """
     x, y, c, s = pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2])
     body = np.array([x, y, pose[2], outline.length_m, outline.width_m, 0.0])
-    p_WP = x + outline.control_point_m * c, y + outline.control_point_m * s
     radius = 0.5 * math.hypot(outline.length_m, outline.width_m)
     planes, gaps, used = np.empty((_MOST_PLANES, 3)), np.empty(_MOST_PLANES), 0
-    box = np.zeros(6)
-    for k in range(OBJECT_SLOTS + len(rectangles)):
-        if k < OBJECT_SLOTS:
-            at = k * OBJECT_SIZE
-            if objects[at + THERE] < 0.5:
-                continue
-            box[:] = 0.0
-            box[0], box[1] = p_WP[0] + objects[at + X], p_WP[1] + objects[at + Y]
-        else:
-            box[:] = rectangles[k - OBJECT_SLOTS]
+    for k in range(len(rectangles)):
+        box = rectangles[k]
         far = radius + 0.5 * (box[3] + box[4]) + box[5] + _REACH_M
         if (box[0] - x) ** 2 + (box[1] - y) ** 2 > far * far:
             continue

@@ -24,9 +24,10 @@ from systems.planning.outline_planes import BodyOutline, outline_planes
 from systems.planning.velocity_filter import (
     FilterNumbers,
     filtered_velocity,
-    objects_at_rest,
+    without_known,
 )
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
+from systems.world.geometry import control_point
 
 #: Distance between objects and the disc around the axle that contains the body, m (our
 #: choice). The lag of the motors uses up to 1 cm of this distance.
@@ -45,6 +46,11 @@ class SafetyNumbers(NamedTuple):
     """(k, 6) rectangles of known obstacles in W."""
     robot: RobotParameters
     tick_s: float
+
+
+def turning_distance_m(robot: RobotParameters) -> float:
+    """Returns the distance of P from objects at which the body can turn freely, m."""
+    return body_radius(robot) + robot.control_point_m + _MARGIN_M
 
 
 @register_jitable
@@ -67,12 +73,10 @@ def safety_filter_step(
     objects = np.asarray(objects)
     planes = np.empty((0, 3))
     if route_clearance[0] < numbers.limits.keep_m + _NARROW_M:
-        planes = outline_planes(
-            (pose[0], pose[1], theta),
-            objects_at_rest(objects),
-            numbers.known,
-            numbers.outline,
-        )
+        p_WP = control_point((pose[0], pose[1], theta), robot.control_point_m)
+        objects = without_known(objects, p_WP, numbers.known)
+        here = pose[0], pose[1], theta
+        planes = outline_planes(here, numbers.known, numbers.outline)
     vx, vy, slack = filtered_velocity(
         wanted, before, theta, objects, planes, numbers.limits
     )
@@ -103,8 +107,8 @@ class SafetyFilter(Block):
 
     Usually P keeps from objects at rest the distance at which the body can turn freely.
     Where the clearance of the route is hardly more or even less, the outline of the
-    body keeps 2 cm from known obstacles and from the sensed objects. The planner takes
-    such routes only through passages that are wide enough for the body.
+    body keeps 2 cm from known obstacles instead. The planner takes such routes only
+    through passages that are wide enough for the body.
 
     The port ``filter_report`` has two numbers. The first is the slack: the speed by
     which the velocity violates constraints, m/s. The second is 1 if the filter has
@@ -154,7 +158,7 @@ class SafetyFilter(Block):
         self.set_name("safety_filter")
         epsilon = robot.control_point_m
         limits = FilterNumbers(
-            body_radius(robot) + epsilon + _MARGIN_M,
+            turning_distance_m(robot),
             robot.top_speed_m_s,
             robot.wheel_separation_m / (2.0 * epsilon),
         )

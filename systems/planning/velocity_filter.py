@@ -12,6 +12,7 @@ from systems.framework.compiling import njit
 from systems.planning.half_planes import nearest_velocity
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
+from systems.world.geometry import beyond_rectangle
 
 #: Objects below this speed count as at rest, m/s.
 _RESTS_M_S = 0.02
@@ -24,6 +25,8 @@ _HORIZON_S = 4.0
 #: Time within which the robot leaves a moving object that has come too near, s (our
 #: choice).
 _LEAVE_S = 0.1
+#: An object at rest this near to a known obstacle is part of it, m (our choice).
+_ON_MAP_M = 0.1
 #: An object nearer to P than this distance, m, has no defined direction and is ignored.
 _TOUCHES_M = 1e-9
 
@@ -127,14 +130,33 @@ def _moves(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def objects_at_rest(objects: Any) -> Any:  # pragma: no cover  (compiled)
-    """Returns a copy of the port ``objects_W`` without robots and moving objects."""
-    resting = objects.copy()
+def without_known(
+    objects: Any, p_WP: Any, rectangles: Any
+) -> Any:  # pragma: no cover  (compiled)
+    """Returns the objects that are not on the map.
+
+    Args:
+        objects: (64,) value of the port ``objects_W``.
+        p_WP: (x, y) of the control point P in the world frame W, m.
+        rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
+            radius) in W, m and rad.
+
+    Returns:
+        (64,) copy without the objects at rest whose nearest point is within
+        ``_ON_MAP_M`` of a known obstacle.
+    """
+    others = objects.copy()
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE
         if objects[at + ROBOT] > 0.5 or _moves(objects, at):
-            resting[at + THERE] = 0.0
-    return resting
+            continue
+        x, y = p_WP[0] + objects[at + X], p_WP[1] + objects[at + Y]
+        for k in range(len(rectangles)):
+            du, dv = beyond_rectangle((x, y), rectangles[k])
+            if math.hypot(du, dv) < _ON_MAP_M:
+                others[at + THERE] = 0.0
+                break
+    return others
 
 
 @njit(cache=True)
@@ -170,8 +192,8 @@ def filtered_velocity(
         v_WP: Present velocity (x, y) of P in the world frame W, m/s.
         theta: Heading of the robot, rad.
         objects: Objects in the format of the port ``objects_W``.
-        outline: (n, 3) half planes of ``outline_planes``. They replace those of the
-            objects at rest; without such planes, P keeps its distance from them.
+        outline: (n, 3) half planes of ``outline_planes``, in addition to those of the
+            objects.
         numbers: Distances and limits.
 
     Returns:
@@ -210,8 +232,6 @@ def filtered_velocity(
             )
             share = 0.5 if is_robot else 1.0
             offset = nx * v_WP[0] + ny * v_WP[1] + share * inside
-        elif len(outline) > 0:
-            continue
         else:
             # An object at rest. A hard plane limits the approach. If the object is too
             # near, a soft plane also requires P to move away.

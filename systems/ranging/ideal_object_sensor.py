@@ -167,9 +167,9 @@ def _join_rests(
     """Leaves one object where rectangles at rest meet.
 
     The function removes an object whose nearest point is within ``_JOINED_M`` of a
-    rectangle that is nearer to P. What remains are the points at which the distance
-    from all obstacles at rest has a local minimum. They do not depend on how a wall is
-    cut into rectangles. ``slots`` is modified in place.
+    rectangle that is nearer to P. The other objects are the points at which the
+    distance from all obstacles at rest has a local minimum. They do not depend on how a
+    wall is cut into rectangles. ``slots`` is modified in place.
     """
     order, away = np.empty(len(slots), dtype=np.int64), np.empty(len(slots))
     count = 0

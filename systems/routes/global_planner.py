@@ -14,8 +14,9 @@ from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
+from systems.planning.safety_filter import turning_distance_m
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.occupancy_grid import OccupancyGrid, free_grid
+from systems.routes.occupancy_grid import CELL_M, OccupancyGrid, free_grid
 from systems.routes.parameters import RouteParameters
 from systems.routes.route import (
     ROUTE_POINTS,
@@ -46,8 +47,9 @@ _STALL_M, _STALLED_S = 0.1, 6.0
 _ARRIVED_M = 0.05
 #: Largest value of the port ``route_clearance``, m.
 _FAR_M = 1e6
-#: Least distance between the side of the body and a known obstacle, m (our choice).
-_BESIDE_M = 0.05
+#: Least planned distance between the side of the body and a known obstacle, m (our
+#: choice). With cells of 5 cm, each passage that leaves 5 cm on both sides is found.
+_BESIDE_M = 0.025
 
 
 class PlannerNumbers(NamedTuple):
@@ -60,6 +62,8 @@ class PlannerNumbers(NamedTuple):
     goal: tuple[float, float]
     clearances: NDArray[np.float64]
     """(n,) clearances that the planner tries in this order, m."""
+    seen_m: float
+    """Least distance of new routes from seen obstacles, m."""
     replans: bool
     """Whether the planner makes new routes."""
     control_point_m: float
@@ -89,7 +93,13 @@ def _plan_again(
     """Plan a route from P past known obstacles, seen points and robots at rest."""
     discs = discs_to_avoid(state.seen, objects, p_WP)
     points = find_widest_route(
-        numbers.grid, p_WP, numbers.goal, numbers.rectangles, discs, numbers.clearances
+        numbers.grid,
+        p_WP,
+        numbers.goal,
+        numbers.rectangles,
+        discs,
+        numbers.clearances,
+        numbers.seen_m,
     )
     if len(points) == 0:
         return False
@@ -161,9 +171,10 @@ class GlobalPlanner(Block):
     known to move. It remembers at most one point per cell of its grid.
 
     If no route has the desired clearance, the planner accepts less, down to half of the
-    width of the body plus 5 cm. The output ``route_clearance`` is the distance from
-    obstacles at the route's point nearest to P. It includes all obstacles that the
-    planner knew when it made the route.
+    width of the body plus 2.5 cm. From seen obstacles, it keeps the distance at which
+    the body can turn, because it knows only points of them. The output
+    ``route_clearance`` is the distance from obstacles at the route's point nearest to
+    P. It includes all obstacles that the planner knew when it made the route.
 
     The robot stalls if P advances by less than 10 cm along the route in 6 s. Within 5
     cm of the goal, it does not count as stalled. If the robot stalls, the block plans a
@@ -257,6 +268,7 @@ def _make_step(
         rectangles,
         goal,
         clearances_to_try(parameters.clearance_m, least_m),
+        turning_distance_m(robot) + CELL_M,
         parameters.replan,
         robot.control_point_m,
         tick_s,

@@ -31,7 +31,7 @@ class RouteParameters(Parameters):
     clearance_m: float = Field(default=0.35, ge=0.15, le=1_000.0)
     """Planned distance between the route and known obstacles, m. Where no route has
     this distance, the planner accepts less, down to half of the width of the body plus
-    0.05 m. Rounded corners may reduce the distance to 92 %. The planner's grid has
+    0.025 m. Rounded corners may reduce the distance to 92 %. The planner's grid has
     cells of 0.05 m, which are too coarse for less than 0.15 m.
     """
     replan: bool = True

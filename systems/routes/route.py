@@ -408,6 +408,7 @@ def find_widest_route(
     rectangles: Any,
     discs: Discs,
     clearances: Any,
+    seen_m: float,
 ) -> Any:  # pragma: no cover  (compiled)
     """Finds a route with the first of several clearances that permits one.
 
@@ -419,6 +420,7 @@ def find_widest_route(
             radius) in W, m and rad.
         discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
         clearances: (c,) clearances to try, m.
+        seen_m: Least distance of the route from the discs, m.
 
     Returns:
         (p, 2) points in W, m, see ``find_route``. The array is empty if there is no
@@ -427,9 +429,11 @@ def find_widest_route(
     points = np.empty((0, 2))
     for clearance in clearances:
         grid = OccupancyGrid(free.blocked.copy(), free.low)
+        grown = discs.copy()
+        grown[:, 2] += max(seen_m - clearance, 0.0)
         block_rectangles(grid, rectangles, clearance)
-        block_discs(grid, discs, clearance)
-        points = find_route(grid, start, goal, rectangles, discs, clearance)
+        block_discs(grid, grown, clearance)
+        points = find_route(grid, start, goal, rectangles, grown, clearance)
         if len(points) > 0:
             break
     return points
@@ -449,7 +453,9 @@ def fill_clearances(
         discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
     """
     for k in range(len(points)):
-        clearances[k] = place_clearance(points[k, 0], points[k, 1], rectangles, discs)
+        clearances[k] = _clearance(
+            points[k], points[k], rectangles, discs, -np.inf, np.inf
+        )
 
 
 @njit(cache=True)
@@ -538,7 +544,7 @@ def plan_route(
     if math.dist(start, goal) < _SHORTEST_M:
         raise InputError("goal_m", f"{_text(goal)} is where P starts; move it")
     grid = free_grid([start, goal], known)
-    points = find_widest_route(grid, start, goal, known, discs, clearances)
+    points = find_widest_route(grid, start, goal, known, discs, clearances, 0.0)
     if not len(points):
         raise InputError(
             "goal_m",

@@ -226,3 +226,31 @@ def test_a_wall_may_be_cut_into_pieces():
     np.testing.assert_allclose(ends[2], ends[0], atol=1e-6)
     # The wall pushes P aside.
     assert np.max(ends[0][1]) > 0.1
+
+
+def test_a_pioneer_passes_a_door_that_leaves_6_cm_on_each_side():
+    """Straight on and at an angle, without contact; in its width it could not turn."""
+    for y in (0.0, 1.0):
+        doors = [
+            {"name": f"wall {side}", "waypoints_m": [[3.0, side * 1.25]],
+             "size_m": [0.2, 2.0]}
+            for side in (-1, 1)
+        ]  # fmt: skip
+        ends = [
+            {"name": f"end {side}", "waypoints_m": [[3.0, side * 2.3]],
+             "size_m": [9.0, 0.1]}
+            for side in (-1, 1)
+        ]  # fmt: skip
+        sides = [
+            {"name": f"side {x}", "waypoints_m": [[x, 0.0]], "size_m": [0.1, 4.7]}
+            for x in (-1.5, 7.5)
+        ]
+        changes = {
+            "robot": {"preset": "p3dx"},
+            "start.position_m": [0.0, y],
+            "route.goal_m": [6.0, y],
+            "obstacles": doors + ends + sides,
+        }
+        result = simulate(load_scenario("unknown_block", changes), engine="compiled")
+        assert result.cause == "reached", y
+        assert result.columns["replans"][-1] == 0.0

@@ -11,7 +11,6 @@ from scipy.spatial.distance import cdist
 from systems.planning.outline_planes import BodyOutline, outline_gap, outline_planes
 
 OUTLINE = BodyOutline(0.455, 0.381, 0.1655)
-NOTHING = np.zeros(64)
 
 
 def edges(x, y, theta, length, width, radius):
@@ -51,7 +50,7 @@ def test_a_plane_limits_the_speed_at_which_the_gap_shrinks():
         box = np.array([*place, 0.3, *size, 0.0])
         body = np.array([*pose, OUTLINE.length_m, OUTLINE.width_m, 0.0])
         gap = outline_gap(body, box)[0]
-        planes = outline_planes(pose, NOTHING, box[None], OUTLINE)
+        planes = outline_planes(pose, box[None], OUTLINE)
         if not 0.03 < gap < 0.5 or len(planes) == 0:
             continue
         (plane,) = planes
@@ -71,10 +70,9 @@ def test_a_plane_limits_the_speed_at_which_the_gap_shrinks():
 
 def test_what_is_far_limits_nothing_and_a_point_ahead_the_speed():
     far = np.array([[3.0, 0.0, 0.0, 1.0, 1.0, 0.0]])
-    assert len(outline_planes(np.zeros(3), NOTHING, far, OUTLINE)) == 0
-    seen = NOTHING.copy()
-    # 0.4 m ahead of P, which is 0.062 m behind the front of the body.
-    seen[:3] = 1.0, 0.4, 0.0
-    (plane,) = outline_planes(np.zeros(3), seen, np.empty((0, 6)), OUTLINE)
+    assert len(outline_planes(np.zeros(3), far, OUTLINE)) == 0
+    # A point 0.4 m ahead of P, which is 0.062 m behind the front of the body.
+    ahead = np.array([[0.1655 + 0.4, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    (plane,) = outline_planes(np.zeros(3), ahead, OUTLINE)
     gap = 0.4 + 0.1655 - 0.2275
     np.testing.assert_allclose(plane, [-1.0, 0.0, -4.0 * (gap - 0.02)], atol=1e-12)
