@@ -35,6 +35,7 @@ from systems.planning.hazards import (
 )
 from systems.planning.looks import HazardSensors
 from systems.planning.turning import (
+    TURN_FIRST_RAD,
     TURN_GAIN,
     TURN_RATE_RAD_S,
     slowed_by,
@@ -295,7 +296,7 @@ def drive_guarded(
         mark_blocked(state.way, place, time + _MARK_S)
         _begin_backing(m, time)
     if m.mode[0] == BACKING:
-        _back(m, time, pose, report)
+        _back(m, time, pose, error, report)
     if m.mode[0] == DRIVING:
         _drive(time, velocity, wanted, error, there, state, numbers)
     _evade(time, pose, wanted, error, state, numbers)
@@ -310,14 +311,18 @@ def _begin_backing(m: DriveMemory, time: float) -> None:  # pragma: no cover  (c
 
 @njit(cache=True)
 def _back(
-    m: DriveMemory, time: float, pose: Any, report: Any
+    m: DriveMemory, time: float, pose: Any, error: float, report: Any
 ) -> None:  # pragma: no cover  (compiled)
     """Drives back for ``_BACKING_S``, or ahead if the guard does not let it drive back.
 
-    A robot that can neither turn nor drive back gets room for the turn ahead.
+    A robot that can neither turn nor drive back gets room for the turn ahead. With a
+    large heading error, it turns as soon as the guard permits the turn.
     """
     since = time - m.backed_s[0]
-    held = report[0] >= TURNED and since > _PATIENCE_S
+    if abs(error) > TURN_FIRST_RAD:
+        m.turn[0] = turn_rate(error)
+    held = report[0] >= BRAKED if m.turn[0] != 0.0 else report[0] >= TURNED
+    held = held and since > _PATIENCE_S
     if held and m.backs[0] < 0.0:
         m.backs[0], m.backed_s[0] = 1.0, time
     elif held or since > _BACKING_S:

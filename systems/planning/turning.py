@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 # ``TURN_RATE_RAD_S``: largest wanted yaw rate, rad/s.
 TURN_GAIN, TURN_RATE_RAD_S = 3.0, 2.0
 #: If the heading error exceeds this angle, rad, the robot turns before it drives.
-_TURN_FIRST_RAD = 1.0
+TURN_FIRST_RAD = 1.0
 
 
 @register_jitable
@@ -41,7 +41,7 @@ def slowed_by(error: float, speed: float) -> float:
         Speed, m/s; 0 if the error is so large that the robot first has to turn.
     """
     if speed > 0.0:
-        speed *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0
+        speed *= math.cos(error) if abs(error) < TURN_FIRST_RAD else 0.0
     return speed
 
 
