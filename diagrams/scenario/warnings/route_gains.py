@@ -186,8 +186,8 @@ def goal_warnings(
     if own.zone_narrows and robot.route.replan:
         return []
     if own.zone_narrows:
-        off = [math.hypot(*beyond_rectangle(p, row)) for row in known]
-        zone_m = min([zone_m, *off])
+        distances = [math.hypot(*beyond_rectangle(p, row)) for row in known]
+        zone_m = min([zone_m, *distances])
     pull, push = own.stiffness_n_m, own.contact_stiffness_n_m
     pushing: list[str] = []
     for _ in range(_STEPS):

@@ -158,9 +158,12 @@ def test_the_points_behind_the_margins_are_marked(kind):
     found = phonotaxis.margins(control.tf([0.5], [1.0, -1.0], 0.05))
     axes = found.plot(kind).axes[0]
     marks = [line for line in axes.get_lines() if ": " in str(line.get_label())]
-    texts = [mark.get_label().partition(":")[0] for mark in marks]
+    texts = [str(mark.get_label()).partition(":")[0] for mark in marks]
     assert texts == ["gain up", "phase", "nearest to -1"]
-    points = [np.ravel(mark.get_data()) for mark in marks]
+    points = [
+        [float(value) for values in mark.get_data() for value in np.asarray(values)]
+        for mark in marks
+    ]
     np.testing.assert_allclose(points, expected, rtol=0.01, atol=0.02)
 
 
@@ -176,4 +179,4 @@ def test_results_of_loops_have_documents():
         assert len(document) >= 5
     assert document["verdict"] == "stable"
     with pytest.raises(InputError, match=r"kind: is 'bod'; use one of bode, nyquist"):
-        phonotaxis.margins(process).plot("bod")
+        phonotaxis.margins(process).plot("bod")  # type: ignore[arg-type]

@@ -6,6 +6,7 @@ import math
 import re
 import sys
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -228,7 +229,8 @@ def test_a_law_that_refuses_autodiff_is_linearized_by_differences(own_laws):
     (said,) = loop.differences()
     assert "cannot differentiate the law" in said
     search = SimpleNamespace(scenario=loop.scenario, notes=("another",))
-    notes = OPERATING_POINTS.notes(SimpleNamespace(search=search))
+    found: Any = SimpleNamespace(search=search)
+    notes = OPERATING_POINTS.notes(found)
     assert notes == (said, "another")
     assert rest(f"{own_laws}:smooth").differences() == ()
     law = radial_law(loop.scenario)
@@ -238,13 +240,13 @@ def test_a_law_that_refuses_autodiff_is_linearized_by_differences(own_laws):
     assert law.gradient(3.5, 0.5) == pytest.approx((0.0, 0.0), abs=1e-8)
     smooth = rest(f"{own_laws}:smooth")
     at = (0.6, 0.1, 0.2)
-    slopes = [
+    matrices = [
         each.period_derivatives(*each.settled_state(at)).A[
             :, [each.state_names.index(f"plant.{k}") for k in ("x", "y", "theta")]
         ]
         for each in (loop, smooth)
     ]
-    np.testing.assert_allclose(*slopes, atol=1e-8)
+    np.testing.assert_allclose(*matrices, atol=1e-8)
 
 
 def test_a_law_block_of_floats_is_linearized_by_differences(own_laws):
