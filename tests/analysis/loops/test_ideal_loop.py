@@ -246,7 +246,7 @@ def test_a_law_that_refuses_autodiff_is_linearized_by_differences(own_laws):
         ]
         for each in (loop, smooth)
     ]
-    np.testing.assert_allclose(*matrices, atol=1e-8)
+    np.testing.assert_allclose(matrices[0], matrices[1], atol=1e-8)
 
 
 def test_a_law_block_of_floats_is_linearized_by_differences(own_laws):
