@@ -14,6 +14,8 @@ from analysis.views.framing import run_title, shown_rectangle
 from analysis.views.scene import Layer, Obstacle, Scene, Thing
 
 _HERE = Path(__file__).parent
+#: Largest number of obstacles whose names a replay shows.
+_MOST_NAMES = 30
 #: Beginning of the call in Meshcat's page that passes a message to the viewer.
 _HANDLE = "viewer.handle_command_bytearray("
 _SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -35,7 +37,7 @@ def replay_page(
     data = {
         "end_s": result.simulated_s,
         "bounds_m": shown_rectangle(result),
-        "names": [_name(body) for body in scene.bodies.values()],
+        "names": _names([*scene.bodies.values()]),
         "charts": charts,
     }
     # Without the replacement, a text of the scenario that contains "</script>" would
@@ -81,11 +83,22 @@ def replay_page(
     )
 
 
-def _name(body: Thing) -> tuple[str, str, float, float]:
-    """Returns path and name of a body, and x and y of its label in its axes, m."""
-    solid = body.shape
-    x, y = solid.shape.middle if isinstance(solid, Obstacle) else (0.0, 0.0)
-    return body.path, body.name, x, y
+def _names(bodies: Sequence[Thing]) -> list[tuple[str, str, float, float]]:
+    """Returns path and name of bodies, and x and y of the labels in their axes, m.
+
+    The labels of many obstacles would hide the scene, so that they are left out.
+    """
+    obstacles = [body for body in bodies if isinstance(body.shape, Obstacle)]
+    crowded = len(obstacles) > _MOST_NAMES
+    found = []
+    for body in bodies:
+        solid, (x, y) = body.shape, (0.0, 0.0)
+        if isinstance(solid, Obstacle):
+            if crowded:
+                continue
+            x, y = solid.shape.middle
+        found.append((body.path, body.name, x, y))
+    return found
 
 
 def _panels(
