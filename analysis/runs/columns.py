@@ -125,7 +125,8 @@ _CONTROL = [
     *_of("rad/s", wanted_turn="yaw rate that the law commands"),
     *_of(
         "number",
-        plan_mode="0 no target, 1 driving, 2 looking, 3 backing off or making room to turn, 4 no path found",
+        plan_mode="0 no target, 1 driving, 2 looking, 3 backing off or making room to "
+        "turn, 4 no path found",
     ),
     *_xy("m", "carrot", "the point that the law heads for, in W"),
     *_of("m", way_left="remaining path length to the target"),

@@ -87,7 +87,8 @@ def approach_on_route(
     if tick % numbers.replan_ticks == 0 or way.points[0] == 0:
         clear = np.array([[target[0], target[1], SOURCE_CLEARANCE_M]])
         goal = target[0], target[1]
-        find_way(way, space, (x, y), goal, 0.0, numbers.radius_m, clear)
+        radii = numbers.radius_m, numbers.radius_m
+        find_way(way, space, (x, y), goal, 0.0, radii, clear)
     gx, gy = find_carrot(way, x, y, _LOOK_AHEAD_M)
     straight = math.hypot(target[0] - px, target[1] - py)
     left = max(straight, way.length_m[0] - ahead) - numbers.follow.distance_m
