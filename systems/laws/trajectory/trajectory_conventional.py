@@ -26,7 +26,7 @@ class TrajectoryImpedanceParameters(ImpedanceParameters):
 
     @property
     def zone_narrows(self) -> bool:
-        """Whether the zone near P is at most the clearance of the route there.
+        """Whether the zone of objects at rest is at most the clearance of the route.
 
         If true, obstacles that the planner knows do not push a robot on its route.
         """

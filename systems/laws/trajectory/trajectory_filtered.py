@@ -17,8 +17,8 @@ class FilteredTrajectoryParameters(TrajectoryImpedanceParameters):
     """Stiffness K_e to robots and obstacles, N/m (our choice)."""
     security_zone_m: Length = 0.8
     """Distance S from the control point P at which contacts begin, m (our choice).
-    Tables 1 and 2 of the paper have 1 m. The clearance of the route near P limits the
-    distance."""
+    Tables 1 and 2 of the paper have 1 m. For objects at rest, the
+    clearance of the route near P limits the distance."""
 
     @property
     def damping_fades(self) -> bool:

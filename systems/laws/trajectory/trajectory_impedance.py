@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
@@ -12,6 +13,10 @@ from systems.laws.trajectory.trajectory_conventional import (
 from systems.ranging.objects import THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import safe_norm
+
+
+#: An object counts as at rest below this speed, m/s.
+_AT_REST_M_S = 0.05
 
 
 class ContactNumbers(NamedTuple):
@@ -30,6 +35,8 @@ class ContactNumbers(NamedTuple):
     """Whether the damping is 0 at the distance ``begins_m`` and grows toward the
     object.
     """
+    narrowed_m: float = math.inf
+    """Largest ``begins_m`` and ``rest_m`` for objects at rest, m."""
 
 
 class Contact(NamedTuple):
@@ -103,14 +110,18 @@ def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
             continue
         x, y = objects[at + X], objects[at + Y]
         distance = safe_norm(x, y)
-        if distance >= numbers.begins_m:
+        begins_m, rest_m = numbers.begins_m, numbers.rest_m
+        if safe_norm(objects[at + VX], objects[at + VY]) < _AT_REST_M_S:
+            begins_m = min(begins_m, numbers.narrowed_m)
+            rest_m = min(rest_m, numbers.narrowed_m)
+        if distance >= begins_m:
             continue
         v_relative = v_WP[0] - objects[at + VX], v_WP[1] - objects[at + VY]
         share = 1.0 + 0.0 * distance
         if numbers.fades:
-            share = 1.0 - distance / numbers.begins_m
+            share = 1.0 - distance / begins_m
         n = -x / distance, -y / distance
-        overlap = numbers.rest_m - distance
+        overlap = rest_m - distance
         found.append(Contact(n, distance, overlap, v_relative, share))
     return found
 

@@ -118,8 +118,8 @@ def narrowed_impedance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
 ) -> None:
     """Computes acceleration and forces with the zone limited by ``route_clearance``."""
-    zone_m = min(numbers.contacts.begins_m, inputs[4][0])
-    contacts = ContactNumbers(zone_m, zone_m, numbers.contacts.fades)
+    begins_m, rest_m, fades, _ = numbers.contacts
+    contacts = ContactNumbers(begins_m, rest_m, fades, inputs[4][0])
     _command(inputs, numbers.impedance, contacts, outputs, numbers)
 
 
@@ -162,8 +162,9 @@ def TrajectoryImpedanceController_(T):
         input. There is no state and no latency.
 
         If ``narrows`` is true, S is at most the value of the input port
-        ``route_clearance``: the distance of the route near P from the obstacles that
-        the planner knows. These obstacles do not push a robot on its route.
+        ``route_clearance`` for objects at rest: the distance of the route near P from
+        the obstacles that the planner knows. These obstacles do not push a robot on its
+        route.
 
         At most eight objects count. The sampled loop is unstable if the sum of D_e over
         all contacts exceeds 2M/T (80 N s/m for 1 kg). Therefore another block first
