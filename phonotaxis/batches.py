@@ -246,7 +246,7 @@ def compare(
     grid: Mapping[str, Sequence[Any]] | None = None,
     worlds: str | Path | None = None,
     every: int = 1,
-    only: Sequence[str | int] = (),
+    names: Sequence[str | int] = (),
     out: str | Path | None = None,
     workers: int | None = None,
     resume: bool = False,
@@ -274,7 +274,7 @@ def compare(
             with phonotaxis. They replace obstacles, start and goal of the scenario.
         every: Only worlds whose number is divisible by this number. 6 means the test
             worlds of the BARN challenge.
-        only: Names of the worlds. Empty means all.
+        names: Names of the worlds. Empty means all.
         out: New or empty directory. None means the next number under ``results``.
         workers: Number of processes. None means one process per processor core.
         resume: Whether ``out`` may contain runs of the same comparison. These runs are
@@ -292,7 +292,7 @@ def compare(
     """
     chosen = []
     if worlds is not None:
-        chosen = chosen_worlds(worlds, every, [*map(str, only)])
+        chosen = chosen_worlds(worlds, every, [*map(str, names)])
     usual = (WORLD_SCENARIO,) if chosen else EXPERIMENTS
     plans = {
         Path(each).stem: comparison_plan(

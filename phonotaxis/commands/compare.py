@@ -62,7 +62,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
         help="only worlds whose number is divisible by N; 6: the test worlds of BARN",
     )
     parser.add_argument(
-        "--only", metavar="WORLD,...", help="only these worlds, with commas"
+        "--names", metavar="WORLD,...", help="only these worlds, with commas"
     )
     take_batch(
         parser, "layouts per scenario (default: 50), or runs per world (default: 1)"
@@ -102,15 +102,15 @@ def _worlds(options: Namespace) -> list[str]:
     from systems.framework.input_error import InputError
 
     if options.worlds is None:
-        for name in ("every", "only"):
+        for name in ("every", "names"):
             if (value := getattr(options, name)) is not None:
                 raise InputError(
                     name, f"selects worlds; write --worlds PATH --{name} {value}"
                 )
         return []
-    only = [name.strip() for name in (options.only or "").split(",") if name.strip()]
+    names = [each.strip() for each in (options.names or "").split(",") if each.strip()]
     every = 1 if options.every is None else options.every
-    return chosen_worlds(options.worlds, every, only)
+    return chosen_worlds(options.worlds, every, names)
 
 
 COMMAND = Command(

@@ -126,10 +126,18 @@ def _clearance(
     best = most
     dx, dy = b[0] - a[0], b[1] - a[1]
     squared = max(dx * dx + dy * dy, 1e-18)
+    low_x, high_x = min(dx, 0.0), max(dx, 0.0)
+    low_y, high_y = min(dy, 0.0), max(dy, 0.0)
     for k in range(len(discs)):
         x, y = discs[k, 0] - a[0], discs[k, 1] - a[1]
+        reach = max(best + discs[k, 2], 0.0)
+        # Most discs are outside the rectangle around the segment.
+        if x < low_x - reach or x > high_x + reach:
+            continue
+        if y < low_y - reach or y > high_y + reach:
+            continue
         part = min(max((x * dx + y * dy) / squared, 0.0), 1.0)
-        x, y, reach = x - part * dx, y - part * dy, max(best + discs[k, 2], 0.0)
+        x, y = x - part * dx, y - part * dy
         if x * x + y * y < reach * reach:
             best = math.hypot(x, y) - discs[k, 2]
             if best < least:

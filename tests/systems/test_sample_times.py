@@ -52,6 +52,7 @@ LAWS = {
     for name in systems.__all__
     if name.endswith("Controller") and inspect.isclass(getattr(systems, name))
 } - {
+    "DynamicWindowController",
     "GuardedController",
     "PathIntegralController",
     "StopWhenNearController",

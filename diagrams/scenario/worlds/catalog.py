@@ -99,7 +99,7 @@ def _parts(text: Any, folder: Path) -> tuple[str, str]:
 
 
 def chosen_worlds(
-    source: str | Path, every: int = 1, only: Sequence[str] = ()
+    source: str | Path, every: int = 1, names: Sequence[str] = ()
 ) -> list[str]:
     """Selects worlds of a set, as values for the field ``world``.
 
@@ -107,7 +107,7 @@ def chosen_worlds(
         source: See ``open_worlds``.
         every: Only worlds whose number is divisible by this number. The number of a
             world is its name, or its place in the set, from 0, if a name is no number.
-        only: Names of the worlds. Empty: all.
+        names: Names of the worlds. Empty: all.
 
     Returns:
         ``PATH:NAME`` of each world.
@@ -115,21 +115,21 @@ def chosen_worlds(
     Raises:
         InputError: A name is unknown, or no world is left.
     """
-    names = [*open_worlds(source)]
-    for name in only:
-        if name not in names:
+    known = [*open_worlds(source)]
+    for name in names:
+        if name not in known:
             raise InputError(
-                "only", f"{source} has no world {name!r}{did_you_mean(name, names)}"
+                "names", f"{source} has no world {name!r}{did_you_mean(name, known)}"
             )
     if every < 1:
         raise InputError("every", f"{every} must be at least 1")
-    numbers = [*range(len(names))]
-    if all(name.isdecimal() for name in names):
-        numbers = [*map(int, names)]
+    numbers = [*range(len(known))]
+    if all(name.isdecimal() for name in known):
+        numbers = [*map(int, known)]
     chosen = [
         name
-        for name, number in zip(names, numbers, strict=True)
-        if number % every == 0 and (not only or name in only)
+        for name, number in zip(known, numbers, strict=True)
+        if number % every == 0 and (not names or name in names)
     ]
     if not chosen:
         raise InputError("every", f"{every} selects none of the worlds of {source}")

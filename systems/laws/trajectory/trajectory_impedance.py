@@ -14,7 +14,6 @@ from systems.ranging.objects import THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import safe_norm
 
-
 #: An object counts as at rest below this speed, m/s.
 _AT_REST_M_S = 0.05
 

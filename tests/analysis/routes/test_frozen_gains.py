@@ -30,9 +30,7 @@ from systems.framework.input_error import InputError
 from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
 
 #: The wall's face is 0.5 m before P, which is 0.08 m ahead of the axle.
-WALL = (
-    "obstacles=[{name: wall, size_m: [0.2, 40], waypoints_m: [[0.68, 0]], known: false}]"
-)
+WALL = "obstacles=[{size_m: [0.2, 40], waypoints_m: [[0.68, 0]], known: false}]"
 T = 0.025
 
 

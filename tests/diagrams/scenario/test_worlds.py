@@ -282,7 +282,7 @@ def test_worlds_are_chosen_by_number_or_by_name(tmp_path):
     )
     names = [f"{tmp_path}:{k}" for k in (0, 6, 12)]
     assert chosen_worlds(tmp_path, every=6) == names
-    assert chosen_worlds(tmp_path, every=6, only=["3", "6"]) == names[1:2]
+    assert chosen_worlds(tmp_path, every=6, names=["3", "6"]) == names[1:2]
     for every, only, field in ((6, ["3"], "every"), (0, [], "every"), (1, "4", "only")):
         with pytest.raises(InputError) as caught:
             chosen_worlds(tmp_path, every, only)
@@ -324,7 +324,7 @@ def test_the_list_of_worlds(capsys, tmp_path):
     [
         (["worlds", "nowhere"], "worlds: nowhere is no folder with cylinders.csv"),
         (["compare", "--every", "6"], "every: selects worlds; write --worlds PATH"),
-        (["compare", "--worlds", "--only", "99"], "only: shipped has no world '99'"),
+        (["compare", "--worlds", "--names", "99"], "names: shipped has no world '99'"),
         (["compare", "--worlds", "--runs", "0"], "runs: "),
         (["simulate", "barn", "--set", "world=99"], "world: 99 is not known; phono"),
     ],

@@ -157,7 +157,7 @@ def test_the_map_and_the_monitor_know_each_sensor():
     np.testing.assert_allclose(limits[:, 1], [3.0, 1.0, 3.0])
     np.testing.assert_allclose(limits[:, 2], 0.002 + 5.0 * KINDS.each("noise_m"))
     judged = SensingMonitor(sensors=KINDS).step.numbers
-    np.testing.assert_allclose(np.diff(judged.step_m), [0.0, 15.0 * 0.019])
+    np.testing.assert_allclose(np.diff(judged.spike_m), [0.0, 7.5 * 0.019])
     np.testing.assert_allclose(np.diff(judged.turn_rad), np.radians([50.0, -50.0]))
     sectors = sensor_sectors(KINDS, 0.0)
     assert sectors.right.min() == pytest.approx(math.radians(-45.0))
