@@ -289,17 +289,17 @@ def test_known_positions_calibrate_four_microphones():
 
 
 def test_the_file_of_a_large_array_keeps_the_error_of_its_orientation():
-    """A covariance of 72 microphones has no room in a file; its turns are kept."""
+    """A covariance of 64 microphones has no room in a file; its turns are kept."""
     rng = np.random.default_rng(14)
-    true, measured = on_a_stand(rng, 72)
+    true, measured = on_a_stand(rng, 64)
     known = array(measured, position_std_m=0.003, delay_std_s=1e-6)
     delays, _ = draws(true, (3.0, 5.0), 1e-6, rng, 30)
-    result = calibrate_delays(delays, known, covariance=covariance_of(72, 1e-6))
+    result = calibrate_delays(delays, known, covariance=covariance_of(64, 1e-6))
     fields = result.document()["geometry"]
     assert "position_covariance_m2" not in fields
     whole, filed = result.geometry, ArrayGeometry.model_validate(fields)
     for geometry in (whole, filed):
-        found = locate_delays(delays[0], geometry, covariance=covariance_of(72, 1e-6))
+        found = locate_delays(delays[0], geometry, covariance=covariance_of(64, 1e-6))
         systematic = found.estimates[0].bearing_systematic_deg
         turn = 3.0 / 1e3 / math.sqrt(np.sum((true - true.mean(0))[:, :2] ** 2))
         assert systematic == pytest.approx(math.degrees(turn), rel=0.25)
