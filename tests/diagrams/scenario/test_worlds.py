@@ -283,7 +283,11 @@ def test_worlds_are_chosen_by_number_or_by_name(tmp_path):
     names = [f"{tmp_path}:{k}" for k in (0, 6, 12)]
     assert chosen_worlds(tmp_path, every=6) == names
     assert chosen_worlds(tmp_path, every=6, names=["3", "6"]) == names[1:2]
-    for every, only, field in ((6, ["3"], "every"), (0, [], "every"), (1, "4", "only")):
+    for every, only, field in (
+        (6, ["3"], "every"),
+        (0, [], "every"),
+        (1, "4", "names"),
+    ):
         with pytest.raises(InputError) as caught:
             chosen_worlds(tmp_path, every, only)
         assert caught.value.field == field
