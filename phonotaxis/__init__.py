@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.batches.plan import SweepPlan
     from analysis.loops.diagram_linearization import linearize
-    from analysis.loops.given_bursts import loop_burst_cycle
+    from analysis.loops.given_bursts import burst_cycle
     from analysis.loops.given_delays import delay_margin
     from analysis.loops.given_loops import disk_margin, loop_at, margins
     from analysis.loops.given_oscillations import describing_function
@@ -76,6 +76,7 @@ __all__ = [
     "__version__",
     "add_live_view",
     "array_resolution",
+    "burst_cycle",
     "calibrate",
     "calibrate_delays",
     "columns",
@@ -93,7 +94,6 @@ __all__ = [
     "locate",
     "locate_delays",
     "loop_at",
-    "loop_burst_cycle",
     "main",
     "margins",
     "robustness",
@@ -141,7 +141,7 @@ _HOMES = {
     "design": "phonotaxis.loops",
     "delay_margin": "analysis.loops.given_delays",
     "describing_function": "analysis.loops.given_oscillations",
-    "loop_burst_cycle": "analysis.loops.given_bursts",
+    "burst_cycle": "analysis.loops.given_bursts",
     "disk_margin": "analysis.loops.given_loops",
     "laws": "phonotaxis.listings",
     "loop_at": "analysis.loops.given_loops",

@@ -59,7 +59,7 @@ class LoopBurstCycle:
         }
 
 
-def loop_burst_cycle(
+def burst_cycle(
     loop: Any, on_s: float, off_s: float, *, hold: Literal["zero", "last"] = "last"
 ) -> LoopBurstCycle:
     """Computes the growth of a loop that is closed only part of the time.

@@ -103,7 +103,7 @@ def test_no_crossing_is_no_cycle():
 @pytest.mark.parametrize("hold", ["zero", "last"])
 def test_a_scalar_plant_that_hears_part_of_the_time(hold):
     a, k, on, off = 0.3, 2.0, 0.5, 1.5
-    found = phonotaxis.loop_burst_cycle(
+    found = phonotaxis.burst_cycle(
         control.ss([[a]], [[k]], [[1.0]], [[0.0]]), on, off, hold=hold
     )
     during = math.exp((a - k) * on)
@@ -121,7 +121,7 @@ def test_a_sampled_plant_that_hears_part_of_the_time():
     for k in range(5):
         u = -g * x[k] if k < 2 else u
         x.append(x[k] + u)
-    found = phonotaxis.loop_burst_cycle(loop, 0.2, 0.3)
+    found = phonotaxis.burst_cycle(loop, 0.2, 0.3)
     assert found.largest == pytest.approx(abs(x[5]))
     with pytest.raises(InputError, match="multiple of the period"):
-        phonotaxis.loop_burst_cycle(loop, 0.25, 0.3)
+        phonotaxis.burst_cycle(loop, 0.25, 0.3)
