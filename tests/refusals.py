@@ -33,7 +33,7 @@ REFUSALS = (
     ("simulate", "--set", "tick_s=0.0333333"),
     ("simulate", "--set", "start.position_m=[1.9, 0]"),
     ("simulate", "--set", "room.size_m=[2, 2, 3]"),
-    ("simulate", "u_trap", "--law", "guarded", "--set", "robot.width_m=1.85"),
+    ("simulate", "u_trap", "--law", "guarded", "--set", "obstacle_sensing=ideal"),
     ("simulate", "known_u", "--law", "active"),
     ("simulate", "--law", "law.py:law"),
     ("simulate", "--sound", "cut.wav"),
