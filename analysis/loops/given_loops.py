@@ -72,7 +72,7 @@ class OpenedLoop(NamedTuple):
 
 
 def opened_loop(diagram: Any, context: Any, port: Any) -> OpenedLoop:
-    """Opens a loop as ``loop_at`` does, and tells how the port receives the signal."""
+    """Opens a loop as ``loop_at`` does, and states how the port receives the signal."""
     source = find_source(diagram, port)
     closed = linearize(diagram, context, inputs=(), outputs=()).model
     # A continuous block receives the signal as it is after the updates, and a sampled

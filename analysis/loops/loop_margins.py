@@ -8,6 +8,7 @@ miss a crossover or a peak between two of its points or outside the grid.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,6 +111,14 @@ def _gain_margins(
         t / (1.0 - t) for t in T.response(ends)[0, 0].real if abs(1.0 - t) > _NO_LOOP
     ]
     values += [] if T.period_s else [float(model.D[0, 0])]
+    return gain_factors(values)
+
+
+def gain_factors(values: Iterable[float]) -> tuple[float, float]:
+    """Smallest factor of at least 1, and largest below 1, that destabilizes a loop.
+
+    ``values`` are those of L at the frequencies at which L is real.
+    """
     upper, lower = math.inf, 0.0
     for value in values:
         if value < -_NO_LOOP:
@@ -132,8 +141,21 @@ def _phase_margins(
     # |L| = 1 where the real part of T is 1/2.
     found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))
     at = crossings(found, lambda w: np.abs(model.response(w)[0, 0]) - 1.0)
+    lag, lead, where, delay, late = phases_at(
+        at, model.response(at)[0, 0] if at else ()
+    )
+    if not model.period_s and abs(model.D[0, 0]) >= 1.0:
+        # |L| stays at 1 or above at high frequencies, where any delay destabilizes.
+        delay, late = 0.0, math.inf
+    return lag, lead, where, delay, late
+
+
+def phases_at(
+    crossovers: Iterable[float], values: Iterable[complex]
+) -> tuple[float, float, float, float, float]:
+    """Margins as of ``_phase_margins``, from gain crossovers and the values of L."""
     lag, lead, where, delay, late = math.inf, math.inf, math.nan, math.inf, math.nan
-    for w, L in zip(at, model.response(at)[0, 0] if at else (), strict=True):
+    for w, L in zip(crossovers, values, strict=True):
         behind = float(np.angle(-L)) % math.tau  # lag that turns L to -1
         ahead = math.tau - behind
         if min(behind, ahead) < min(lag, lead):
@@ -141,9 +163,6 @@ def _phase_margins(
         lag, lead = min(lag, behind), min(lead, ahead)
         if behind / w < delay:
             delay, late = behind / w, w
-    if not model.period_s and abs(model.D[0, 0]) >= 1.0:
-        # |L| stays at 1 or above at high frequencies, where any delay destabilizes.
-        delay, late = 0.0, math.inf
     return lag, lead, where, delay, late
 
 

@@ -18,6 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from analysis.loops.frequency_levels import crossings, frequency_grid
 from analysis.loops.linear_models import LinearModel
+from analysis.loops.loop_margins import gain_factors, phases_at
 from analysis.loops.margin_results import (
     SKEWS,
     DiskMargin,
@@ -216,23 +217,11 @@ def response_margins(response: LoopResponse, *, stable: bool) -> LoopMargins:
     values = [float(response.at(np.array([w]))[0].real) for w in real]
     if abs(np.tan(np.angle(drawn.L[0]))) < _REAL:  # L is real at zero frequency
         values.append(float(drawn.L[0].real))
-    upper, lower = math.inf, 0.0
-    for value in values:
-        if value < 0.0:
-            gain = -1.0 / value
-            if gain >= 1.0:
-                upper = min(upper, gain)
-            else:
-                lower = max(lower, gain)
-    lag, lead, where, delay, late = math.inf, math.inf, math.nan, math.inf, math.nan
-    for w in crossings(omega, lambda w: np.abs(response.at(w)) - 1.0):
-        behind = float(np.angle(-response.at(np.array([w]))[0])) % math.tau
-        ahead = math.tau - behind
-        if min(behind, ahead) < min(lag, lead):
-            where = w
-        lag, lead = min(lag, behind), min(lead, ahead)
-        if behind / w < delay:
-            delay, late = behind / w, w
+    upper, lower = gain_factors(values)
+    at = crossings(omega, lambda w: np.abs(response.at(w)) - 1.0)
+    lag, lead, where, delay, late = phases_at(
+        at, response.at(np.array(at)) if at else ()
+    )
 
     def least(skew: float) -> tuple[float, float]:
         """Smallest 1/|S + (skew - 1)/2|, and its frequency."""

@@ -192,7 +192,7 @@ def test_the_velocity_of_a_box_that_crosses_ahead(count, most):
 
 
 def test_what_comes_straight_at_it_is_timed_well_by_any_ring():
-    """Toward P a range tells the speed: within 2 % where the beams' number is even."""
+    """Ranges toward P give the speed within 2 % for an even number of beams."""
     for count in (72, 360):
         driven = Driven(ring(count))
         for tick in range(41):

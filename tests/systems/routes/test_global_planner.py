@@ -316,12 +316,8 @@ def test_a_run_has_its_own_start_and_map():
     np.testing.assert_array_equal(step.numbers.rectangles, [WALL])
 
 
-def test_planning_anew_takes_less_than_a_tick(compiled_tick):
-    """10 m x 10 m in cells of 5 cm, 20 boxes, 500 points seen; median of 7.
-
-    The search takes most of the time. It is twice as long as with the clearance alone,
-    because a new route keeps the distance in which the robot can turn from seen points.
-    """
+def test_planning_anew_takes_less_than_10_ms(compiled_tick):
+    """10 m x 10 m in cells of 5 cm, 20 boxes, 500 points seen; median of 7."""
     generator = np.random.default_rng(5)
     boxes = np.column_stack(
         [
@@ -350,7 +346,7 @@ def test_planning_anew_takes_less_than_a_tick(compiled_tick):
         compiled_tick(step.step, 240, state, inputs, (), step.numbers)
         took.append(time.process_time() - begin)
         assert state.progress[REPLANS] == 1.0, k
-    assert np.median(took[1:]) < 0.02  # a tick is 0.025 s
+    assert np.median(took[1:]) < 0.01
 
 
 @pytest.mark.parametrize(
