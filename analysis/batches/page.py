@@ -159,7 +159,8 @@ def _about(batch: Batch, document: dict[str, Any]) -> list[Content]:
             "Brackets and bars are 95 % intervals: Wilson's for rates, order "
             "statistics for medians. A run that raised an error counts as a run "
             "without success and without collision. The averages of "
-            f"{' and '.join(_OF_SUCCESSES)} include only successful runs; those of the "
+            f"{', '.join(_OF_SUCCESSES[:-1])} and {_OF_SUCCESSES[-1]} include only "
+            "successful runs; those of the "
             "other metrics include all runs without an error. "
             "`phonotaxis columns --metrics` describes each metric."
         ),
