@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.occupancy_grid import CELL_M, OccupancyGrid, cell_of
+from systems.routes.occupancy_grid import (
+    CELL_M,
+    Discs,
+    OccupancyGrid,
+    cell_of,
+    sorted_discs,
+)
 from systems.routes.route import place_clearance
 
 #: Largest number of remembered points; further points replace the oldest.
@@ -64,6 +70,7 @@ def remember_objects(
         objects: (64,) value of the port ``objects_W``, which lists the seen objects.
         p_WP: (x, y) of the control point P in W, m.
     """
+    no_discs = sorted_discs(np.empty((0, 3)))
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE
         if objects[at + THERE] < 0.5 or objects[at + ROBOT] > 0.5:
@@ -74,7 +81,7 @@ def remember_objects(
         i, j = cell_of(grid, x, y)
         if i < 0 or seen.taken[i, j]:
             continue
-        if place_clearance(x, y, rectangles, np.empty((0, 3))) < CELL_M:
+        if place_clearance(x, y, rectangles, no_discs) < CELL_M:
             continue
         # With a full memory, replace the oldest point.
         most = len(seen.points)
@@ -90,7 +97,7 @@ def remember_objects(
 @njit(cache=True)
 def discs_to_avoid(
     seen: SeenPoints, objects: Any, p_WP: Any
-) -> Any:  # pragma: no cover  (compiled)
+) -> Discs:  # pragma: no cover  (compiled)
     """Lists the discs that a new route has to avoid: seen points and robots at rest.
 
     Args:
@@ -99,8 +106,7 @@ def discs_to_avoid(
         p_WP: (x, y) of the control point P in the world frame W, m.
 
     Returns:
-        (n, 3) discs. Each row is (x, y, radius), m, in W. Seen points have the radius
-        0.
+        The discs. Seen points have the radius 0.
     """
     count = min(seen.added[0], len(seen.points))
     discs = np.zeros((count + OBJECT_SLOTS, 3))
@@ -118,4 +124,4 @@ def discs_to_avoid(
         discs[count, 0], discs[count, 1] = p_WP[0] + longer * x, p_WP[1] + longer * y
         discs[count, 2] = radius
         count += 1
-    return discs[:count].copy()
+    return sorted_discs(discs[:count])
