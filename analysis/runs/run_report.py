@@ -115,7 +115,7 @@ def _robot_rows(
         rows[METRICS["path_efficiency"].title] = text("path_efficiency")
         if broken := fault_names(result.columns["search_fault"][-1]):
             rows["broken"] = ", ".join(broken)
-    elif robot.kind != "router":
+    elif not result.full_scenario.drives_to_point(result.name):
         fraction = metrics[f"{prefix}following_fraction"]
         percent = "-" if fraction is None else f"{100.0 * fraction:.0f} %"
         rows |= {

@@ -39,7 +39,7 @@ def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
     If the source is a robot that searches for odor, there are bursts only after
     ``call_time``. A robot that drives to a goal hears no bursts.
     """
-    if result.scenario.only.has_goal:
+    if result.full_scenario.drives_to_point(result.name):
         return []
     sound, whole = result.scenario.source.sound, result.full_scenario
     caller = whole.robots.get(whole.target(result.name))

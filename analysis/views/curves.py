@@ -214,6 +214,8 @@ def _range(result: RunResult) -> Panel:
     columns, follow = result.columns, result.scenario.only.follow_distance_m
     true = columns["source_range_true"]
     curves = [Curve("true", result.time, true, COLORS["source"])]
+    if result.full_scenario.drives_to_point(result.name):
+        return Panel("range of goal", "m", curves, 0.0, 1.3 * float(np.max(true)))
     if "source_range" in columns:
         curves.append(_heard(result, "estimated", columns["source_range"], 2.0))
     curves.append(_level_line(result, "follow distance", follow))
@@ -244,6 +246,8 @@ def _bearing(result: RunResult) -> Panel:
     columns, time = result.columns, result.time
     true = _without_jumps(np.degrees(columns["source_bearing_true"]))
     curves = [Curve("true", time, true, COLORS["source"])]
+    if result.full_scenario.drives_to_point(result.name):
+        return Panel("bearing of goal", "deg", curves)
     if "source_bearing" in columns:
         heard = np.degrees(columns["source_bearing"])
         curves.append(_heard(result, "estimated", heard, 2.0))

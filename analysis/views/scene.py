@@ -251,9 +251,10 @@ def scene_bodies(
         robot = scenario.robots[name]
         path = f"robots/{name}" if several else "robot"
         plays = robot.loudspeaker is not None
-        shape = RobotBody(robot.robot, not robot.has_goal, plays)
+        hears = not scenario.drives_to_point(name)
+        shape = RobotBody(robot.robot, hears, plays)
         label = f"{name if several else 'robot'} with its microphones"
-        if robot.has_goal:
+        if not hears:
             label = "" if several else "robot"
         found[name] = Thing(path, shape, tints[name], times, poses, name, label)
     followed = {scenario.target(name) for name in scenario.robots}
@@ -263,7 +264,8 @@ def scene_bodies(
         body = SourceBody(source.length_m, source.width_m, source.body)
         poses = source.path().poses(times)
         label = _source_label(scenario, name, followed)
-        found[name] = Thing(path, body, color, times, poses, name, label)
+        tag = _source_name(scenario, name)
+        found[name] = Thing(path, body, color, times, poses, tag, label)
     for each in scenario.all_obstacles:
         poses = each.path().poses(times if each.path().moves else times[:1])
         label = "moving obstacle" if each.path().moves else "obstacle at rest"
@@ -276,7 +278,16 @@ def scene_bodies(
 def _source_label(scenario: Scenario, name: str, followed: set[str]) -> str:
     if name not in followed:
         return f"{name} (not followed)"
-    return name if len(scenario.sources) > 1 else "the source"
+    if len(scenario.sources) > 1:
+        return name
+    return "the goal" if scenario.is_goal_point(name) else "the source"
+
+
+def _source_name(scenario: Scenario, name: str) -> str:
+    """Returns the name of a source in pictures; a single goal point is the goal."""
+    if len(scenario.sources) == 1 and scenario.is_goal_point(name):
+        return "goal"
+    return name
 
 
 def _robot_colors(scenario: Scenario) -> dict[str, str]:
@@ -321,8 +332,13 @@ def _sources(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
         body, meaning = bodies[name], "what is followed"
         if body.color == COLORS["interferer"]:
             meaning = "emits sound, and the robot does not follow it"
-        rings = rings_of(body, sound_bursts(source.sound, result.simulated_s))
-        yield Layer(name, meaning, (body.color,), [body, rings], switched=False)
+        things = [body]
+        if scenario.is_goal_point(name):
+            meaning = "where the robot drives to"
+        else:
+            bursts = sound_bursts(source.sound, result.simulated_s)
+            things.append(rings_of(body, bursts))
+        yield Layer(body.name, meaning, (body.color,), things, switched=False)
 
 
 def _obstacles(scenario: Scenario, bodies: Mapping[str, Thing]) -> Iterator[Layer]:
@@ -448,6 +464,8 @@ def _estimates(result: RunResult, bodies: Mapping[str, Thing]) -> Iterator[Layer
         path = bodies[name].path.replace("robot", "estimate", 1)
         if robot.kind == "router":
             places, seen, shape, label = own.vector("target"), None, Estimate(), ""
+        elif result.full_scenario.drives_to_point(name):
+            continue
         elif "p_WS_estimated_x" in columns and robot.searches is None:
             valid = columns["target_valid"] > 0.5
             # An estimate changes the target only from the next tick on.

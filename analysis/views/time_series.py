@@ -41,7 +41,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
             # Yellow is hard to see on white. The line at the bottom is easy to see.
             axes.axvspan(start, end, ymax=0.025, color=COLORS["sounding"], linewidth=0)
         _draw(axes, panel)
-    hears = not result.scenario.only.has_goal
+    hears = not result.full_scenario.drives_to_point(result.name)
     all_axes[-1].set(
         xlabel="time (s)" + (", shaded while the source sounds" if hears else ""),
         xlim=(0.0, max(result.simulated_s, 1e-3)),

@@ -231,6 +231,25 @@ class Scenario(RunParameters):
             return own.follows or next(iter(self.sources))
         return ODOR
 
+    def is_goal_point(self, source: str) -> bool:
+        """Returns whether a source is only a point to drive to, as ``goal_m`` is.
+
+        Such a source has no body, does not move, and each robot that follows it knows
+        its position at all times. Its sound has no effect.
+        """
+        own = self.sources.get(source)
+        if own is None or own.body or own.path().moves:
+            return False
+        return all(
+            isinstance(robot, Follower) and robot.hearing == "ideal_always"
+            for name, robot in self.robots.items()
+            if self.target(name) == source
+        )
+
+    def drives_to_point(self, robot: str) -> bool:
+        """Returns whether the target of a robot is a goal point or that of a route."""
+        return self.robots[robot].has_goal or self.is_goal_point(self.target(robot))
+
     def of_robot(self, name: str) -> Scenario:
         """Returns the scenario of one robot alone, with the source that it follows.
 

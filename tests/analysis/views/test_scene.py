@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from analysis.report.palette import COLORS
+from analysis.runs.run_report import run_document, summary_rows
+from analysis.views.bursts import heard_bursts
+from analysis.views.curves import panels
 from analysis.views.overlays import overlays
 from analysis.views.scene import Cone, Thing, Touched, compose, make_scene
 from diagrams import load_scenario, simulate
@@ -76,3 +79,19 @@ def test_bodies_of_several_robots_have_names_and_colors():
     radio = scene.bodies["radio"]
     assert (radio.path, radio.color) == ("sources/radio", COLORS["interferer"])
     assert not radio.moves
+
+
+def test_a_goal_point_is_no_source_of_sound():
+    """Nothing on its pictures or in its summary speaks of sound or of following."""
+    goal = {"goal_m": [1.0, 0.5], "duration_s": 1.0, "engine": "compiled"}
+    run = simulate(load_scenario({**goal, "law": "conventional"}))
+    layers = {layer.label: layer for layer in layers_of(run)}
+    assert {"robot", "goal", "law"} <= {*layers}
+    assert not {"source", "estimates"} & {*layers}
+    assert [thing.path for thing in layers["goal"].things] == ["source"]
+    assert heard_bursts(run) == []
+    titles = [panel.name for panel in panels(run)]
+    assert titles[:2] == ["range of goal", "bearing of goal"]
+    rows = summary_rows(run, run_document(run))
+    assert "distance at the end" in rows
+    assert not {"follow distance", "frames heard"} & {*rows}
