@@ -3,7 +3,9 @@
 The worker first loads all code that a run needs. Then it forks a child process, which
 does the runs. Drake never frees blocks that are written in Python. The child therefore
 grows by about 1 MB per run, and the worker replaces it after 50 runs with Drake. Runs
-with the compiled engine share their blocks, so a child does 1000 of these runs.
+with the compiled engine share their blocks, so a child does 1000 of these runs. They
+cannot share them if each run has another number of obstacles: a child that has grown by
+1 GB is therefore replaced, too.
 """
 
 from __future__ import annotations
@@ -11,7 +13,9 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+import resource
 import signal
+import sys
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 
@@ -20,6 +24,10 @@ from diagrams import build_sound_follower, load_compiled_code, prepared_loop
 
 READY = "ready"
 RUNS_PER_CHILD = {"drake": 50, "compiled": 1000}
+#: Growth of a child, bytes, after which the worker replaces it.
+GROWTH_PER_CHILD = 1e9
+#: Unit of ``ru_maxrss``, bytes.
+_MEMORY_UNIT = 1 if sys.platform == "darwin" else 1024
 
 
 def main(file_descriptor: int) -> None:
@@ -72,9 +80,17 @@ def _warm(task: Task) -> None:
 
 
 def _serve(connection: Connection) -> None:
-    """Runs ``RUNS_PER_CHILD`` tasks; raises EOFError if the socket closes before."""
-    worn = 0.0
-    while worn < 1.0:
+    """Runs tasks until the child is to be replaced.
+
+    If the socket closes before, the function raises an EOFError.
+    """
+    worn, most = 0.0, _most_memory() + GROWTH_PER_CHILD
+    while worn < 1.0 and _most_memory() < most:
         task: Task = connection.recv()
         connection.send(run_task(task))
         worn += 1.0 / RUNS_PER_CHILD[task.engine]
+
+
+def _most_memory() -> float:
+    """Returns the largest memory that this process has had so far, bytes."""
+    return _MEMORY_UNIT * float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)

@@ -29,6 +29,8 @@ _NO_BLOCKS = {
     "duration_s",
     "arena_m",
     "obstacles",
+    "world",
+    "reference_path_m",
     "stop",
     "robots",
     "sources",
