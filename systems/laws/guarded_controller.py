@@ -143,7 +143,7 @@ class GuardedController(Block):
             max(CRUISE_SPEED_M_S, _CRUISE_SHARE * robot.top_speed_m_s),
             tick_s,
         )
-        state = make_drive_state(guard.cells, sensors.count)
+        state = make_drive_state(guard.cells_for(disc), sensors.count)
         self.declare(
             Step(guarded_step, numbers, state),
             tick_s=tick_s,
