@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
 
 from systems.planning.carrot import find_carrot
+from systems.planning.drive_state import DriveNumbers, DriveState
 from systems.planning.following import wanted_speed
 from systems.planning.hazards import find_movers
 from systems.planning.turning import wrapped
 from systems.planning.way import OCCUPIED, TIGHT, find_way
+from systems.safety.free_space import FreeSpace
 
 #: Distance from the target within which echoes do not block routes, m.
 _SOURCE_CLEARANCE_M = 0.85
@@ -33,9 +36,15 @@ _NEARLY_M, _SETTLE_S = 0.4, 3.0
 
 
 @register_jitable
-def find_heading(  # type: ignore[no-untyped-def]
-    time, target, velocity, pose, state, space, numbers
-):
+def find_heading(
+    time: float,
+    target: Any,
+    velocity: Any,
+    pose: Any,
+    state: DriveState,
+    space: FreeSpace,
+    numbers: DriveNumbers,
+) -> tuple[float, float, bool]:
     """Computes the wanted speed, the heading error, and whether the robot has arrived.
 
     The function works in four steps:
@@ -52,6 +61,15 @@ def find_heading(  # type: ignore[no-untyped-def]
     4. Compute the wanted speed from the remaining distance, the follow distance, and
        the speed at which the target moves away. If the robot has arrived at a target
        that P should reach, the heading error is that of the velocity of P.
+
+    Args:
+        time: Current time, s.
+        target: Position (x, y) of the target, m.
+        velocity: Velocity of the target, m/s.
+        pose: Pose (x, y, theta) of the robot, m and rad.
+        state: State of the law. The function changes the state in place.
+        space: Map of free space.
+        numbers: Constants of the law.
 
     Returns:
         Wanted speed, m/s; heading error, rad; and whether the robot has arrived.
