@@ -53,6 +53,9 @@ def _search(
 ) -> float:  # pragma: no cover  (compiled)
     """Runs A* from the start. The heuristic is the straight distance to the circle."""
     radii = np.array([min(radius, _beyond(start, box)) for box in boxes])
+    circles = np.empty((len(boxes), 3))
+    for k, box in enumerate(boxes):
+        circles[k] = _circle(box, radii[k])
     points = np.empty((1 + 4 * TANGENTS * len(boxes), 2))
     points[0] = start
     for k, box in enumerate(boxes):
@@ -64,7 +67,13 @@ def _search(
         to_goal[k] = max(away - goal_radius, 0.0)
     lengths = np.full(len(points), np.inf)
     lengths[0] = 0.0
-    done = np.zeros(len(points), dtype=np.bool_)
+    # A leg to a point in another grown box is never free. ``cut_by`` is the box that
+    # cut the last leg to a point: it often cuts the next one, too.
+    cut_by = np.zeros(len(points), dtype=np.int64)
+    done = np.array(
+        [_cutting(point, point, boxes, radii, circles, 0) >= 0 for point in points]
+    )
+    done[0] = False
     best = np.inf
     while True:
         here, bound = 0, best
@@ -77,13 +86,17 @@ def _search(
         # For a point inside the goal circle, the last leg has the length 0.
         share = to_goal[here] / max(_distance(points[here], goal), 1e-12)
         last = points[here] + share * (goal - points[here])
-        if _free(points[here], last, boxes, radii):
+        if _cutting(points[here], last, boxes, radii, circles, 0) < 0:
             best = min(best, bound)
         for k in range(len(points)):
             reach = lengths[here] + _distance(points[here], points[k])
-            useful = reach < lengths[k] and reach + to_goal[k] < best
-            if useful and not done[k] and _free(points[here], points[k], boxes, radii):
+            if done[k] or reach >= lengths[k] or reach + to_goal[k] >= best:
+                continue
+            box = _cutting(points[here], points[k], boxes, radii, circles, cut_by[k])
+            if box < 0:
                 lengths[k] = reach
+            else:
+                cut_by[k] = box
 
 
 @njit(cache=True)
@@ -115,11 +128,38 @@ def _outline(
 
 
 @njit(cache=True)
-def _free(
-    start: Floats, end: Floats, boxes: Floats, radii: Floats
-) -> bool:  # pragma: no cover  (compiled)
-    """Whether a straight leg keeps the distance ``radii`` (n,) from the n boxes."""
-    for k in range(len(boxes)):
+def _circle(
+    box: Floats, radius: float
+) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
+    """Returns the middle and the radius of a circle around a grown box, m."""
+    return box[0], box[1], 0.5 * math.hypot(box[3], box[4]) + box[5] + radius
+
+
+@njit(cache=True)
+def _cutting(
+    start: Floats,
+    end: Floats,
+    boxes: Floats,
+    radii: Floats,
+    circles: Floats,
+    first: int,
+) -> int:  # pragma: no cover  (compiled)
+    """Finds a box nearer to a straight leg than its distance in ``radii``.
+
+    The boxes are tried in order, but ``first`` is tried first. The result is the index
+    of the box, or -1.
+    """
+    ahead_x, ahead_y = end[0] - start[0], end[1] - start[1]
+    squared = max(ahead_x * ahead_x + ahead_y * ahead_y, 1e-18)
+    for n in range(-1, len(boxes)):
+        k = n if n >= 0 else first
+        if k >= len(boxes):
+            continue
+        x, y = circles[k, 0] - start[0], circles[k, 1] - start[1]
+        share = min(max((x * ahead_x + y * ahead_y) / squared, 0.0), 1.0)
+        x, y = x - share * ahead_x, y - share * ahead_y
+        if x * x + y * y > circles[k, 2] * circles[k, 2]:
+            continue
         if segment_clearance(start, end, boxes[k]) < radii[k] - GRAZE_M:
-            return False
-    return True
+            return k
+    return -1

@@ -75,7 +75,7 @@ from analysis.views.scene import (
 )
 from diagrams import RunResult
 from diagrams.scenario.bodies import RecordedPath
-from systems.base.robot import RobotParameters, microphones_B
+from systems.base.robot import RobotParameters, body_radius, microphones_B
 from systems.odor.odor_plume import PUFF_SIZE, PUFFS_BEGIN
 from systems.odor.parameters import CONTAINER_M
 from systems.world.shapes import rectangle_outline
@@ -209,7 +209,9 @@ def known_times(result: RunResult) -> list[float]:
     ``MOST_CELLS`` cells.
     """
     end, scenario = result.simulated_s, result.scenario
-    most = max(2, MOST_CELLS // scenario.follower.own_map.cells**2)
+    follower = scenario.follower
+    cells = follower.own_map.cells_for(body_radius(follower.robot))
+    most = max(2, MOST_CELLS // cells**2)
     period = max(KNOWN_PERIOD_S, end / most)
     first = min(FIRST_TICKS * scenario.tick_s, end)
     return [first, *np.arange(period, end, period).tolist(), end]

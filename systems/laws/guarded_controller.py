@@ -10,20 +10,21 @@ from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.laws.parameters import AttractionParameters
-from systems.planning.following import CRUISE_SPEED_M_S
-from systems.planning.guarded_drive import (
-    CLEARANCE_M,
+from systems.planning.drive_state import (
     GIVING_UP,
     DriveNumbers,
     DriveState,
-    drive_guarded,
     make_drive_state,
 )
+from systems.planning.following import CRUISE_SPEED_M_S
+from systems.planning.guarded_drive import drive_guarded
 from systems.planning.looks import HazardSensors
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.parameters import GuardParameters
 from systems.safety.views import range_errors
 
+#: Distance that routes keep between the body and occupied cells, m.
+_CLEARANCE_M = 0.02
 #: Share of the top speed at which a fast robot drives. The rest is left for turns.
 _CRUISE_SHARE = 0.86
 
@@ -129,7 +130,7 @@ class GuardedController(Block):
     ) -> None:
         super().__init__()
         self.set_name("guarded_controller")
-        margin = guard.place_error_m + CLEARANCE_M
+        margin = guard.place_error_m + _CLEARANCE_M
         # In a passage, a body that is longer than wide is narrower than its disc. For a
         # wide body, the difference is too small to risk a place where it cannot turn.
         disc = body_radius(robot)
@@ -143,7 +144,7 @@ class GuardedController(Block):
             max(CRUISE_SPEED_M_S, _CRUISE_SHARE * robot.top_speed_m_s),
             tick_s,
         )
-        state = make_drive_state(guard.cells, sensors.count)
+        state = make_drive_state(guard.cells_for(disc), sensors.count)
         self.declare(
             Step(guarded_step, numbers, state),
             tick_s=tick_s,

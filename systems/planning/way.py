@@ -36,6 +36,8 @@ _TIGHT_M, _NEAR_M = 0.07, 0.19
 # ``STRAIGHT``: length of a straight step.
 # ``ACROSS``: length of a diagonal step.
 STRAIGHT, ACROSS = 10, 14
+#: Time for which routes avoid a place that was marked as blocked, s.
+MARK_S = 10.0
 #: Number of buckets of the queue. This number exceeds the cost of any step.
 _BUCKETS = 2048
 #: Cost of cells that the search has not reached.

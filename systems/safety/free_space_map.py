@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from systems.base.lagged_motion import lagged_motion
 from systems.base.parameters import PlantParameters
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
@@ -246,9 +246,8 @@ class FreeSpaceMap(Block):
             tick_s,
             sensors.round_ticks(tick_s),
         )
-        space = make_free_space(
-            parameters.cells, parameters.cell_m, sensors.count, points
-        )
+        cells = parameters.cells_for(body_radius(robot))
+        space = make_free_space(cells, parameters.cell_m, sensors.count, points)
         self.declare(
             Step(map_step, numbers, MapState(space, np.full(3, np.nan))),
             tick_s=tick_s,

@@ -20,8 +20,14 @@ MARGIN_M = 0.006
 #: Smaller margin, m, that applies to a robot nearer than ``MARGIN_M``. A robot can come
 #: this near if a model is wrong.
 LEAST_MARGIN_M = 0.003
-#: Side of the square that the map remembers, m. The square moves along with the robot.
+# The map remembers a square that moves along with the robot.
+# ``WINDOW_M``: least side of the square, m.
+# ``_WINDOW_RADII``: side of the square for a large robot, as a multiple of the radius
+#   of the disc around its body. Two passages between which a larger robot chooses are
+#   farther apart. If it forgot one at the other, it would drive back and forth.
+# ``_MOST_CELLS``: largest number of cells along a side.
 WINDOW_M = 12.8
+_WINDOW_RADII, _MOST_CELLS = 28.0, 2560
 #: Default of ``GuardParameters.start_bubble_m``.
 START_BUBBLE_M = 1.0
 
@@ -50,7 +56,10 @@ class GuardParameters(Parameters):
     start, in addition to the floor under the body. With 0, the robot starts to move
     only where its sensors have seen free floor next to the body."""
 
-    @property
-    def cells(self) -> int:
-        """Number of cells along a side of the map."""
-        return math.ceil(WINDOW_M / self.cell_m - 1e-9)
+    def cells_for(self, radius_m: float) -> int:
+        """Returns the number of cells along a side of the map.
+
+        ``radius_m`` is the radius of the disc around the axle that contains the body.
+        """
+        side_m = max(WINDOW_M, _WINDOW_RADII * radius_m)
+        return min(math.ceil(side_m / self.cell_m - 1e-9), _MOST_CELLS)

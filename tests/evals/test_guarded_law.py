@@ -11,6 +11,7 @@ from scipy.stats import binom
 from analysis.batches.comparison_plans import comparison_plan
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
+from systems.safety.parameters import GuardParameters
 
 #: Not the seed with which its parameters were chosen.
 SEED, LAYOUTS = 2026, 12
@@ -159,6 +160,40 @@ def test_where_it_can_neither_turn_nor_back_it_drives_ahead():
     run = simulate(load_scenario("default", fields), engine="compiled")
     assert run.cause == "reached"
     assert run.columns["p_WB_x"].max() > 0.05
+
+
+@pytest.mark.slow
+def test_a_large_robot_remembers_both_passages():
+    """The passages of 1.6 m are farther apart than half of a map of 12.8 m.
+
+    With such a map, it forgets each passage at the other and drives back and forth.
+    """
+    walls = [
+        {"name": name, "waypoints_m": [place], "size_m": size}
+        for name, place, size in (
+            ("left", [5.0, 5.6], [20.0, 2.0]),
+            ("right", [5.0, -5.6], [20.0, 2.0]),
+            ("middle", [8.0, 0.0], [2.0, 6.0]),
+        )
+    ]
+    robot = [
+        "robot={length_m: 1.8, width_m: 0.9, control_point_m: 0.9, mass_kg: 100}",
+        *("robot.wheel_radius_m=0.2", "robot.wheel_separation_m=0.7"),
+        "robot.top_speed_m_s=2",
+        "ultrasonic={preset: lidar}",
+        "guard={start_bubble_m: 1.2, obstacle_speed_m_s: 0}",
+    ]
+    room = [f"obstacles={walls}", "arena_m=[40, 30]", "goal_m=[16, 0]"]
+    scenario = load_scenario("default", [*EMPTY, *AT_ORIGIN, *robot, *room])
+    assert simulate(scenario, engine="compiled").cause == "reached"
+
+
+def test_the_map_grows_with_a_large_body():
+    """The side of the map is 12.8 m or 28 radii, in whole cells, at most 2560."""
+    cells = GuardParameters().cells_for
+    assert [cells(0.1), cells(0.446), cells(1.0), cells(4.0)] == [256, 256, 560, 2240]
+    assert GuardParameters(cell_m=0.02).cells_for(1.0) == 1400
+    assert GuardParameters(cell_m=0.005).cells_for(4.0) == 2560
 
 
 def test_the_law_brings_its_guard():

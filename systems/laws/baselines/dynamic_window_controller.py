@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.parameters import PlantParameters
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
@@ -358,5 +358,6 @@ class DynamicWindowController(MapController):
             route_numbers(follow, body[1] + gains.clearance_m, tick_s),
             max(round(_PERIOD_S / tick_s), 1),
         )
-        state = DynamicWindowState(np.zeros(2), make_way(guard.cells))
+        way = make_way(guard.cells_for(body_radius(robot)))
+        state = DynamicWindowState(np.zeros(2), way)
         self.declare(Step(dynamic_window_step, numbers, state), tick_s=tick_s)

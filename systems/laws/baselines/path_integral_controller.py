@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
@@ -380,7 +380,8 @@ class PathIntegralController(MapController):
             max(round(_STEP_S / tick_s), 1),
             _noise(seed),
         )
-        state = PathIntegralState(np.zeros((_STEPS, 2)), make_way(guard.cells))
+        way = make_way(guard.cells_for(body_radius(robot)))
+        state = PathIntegralState(np.zeros((_STEPS, 2)), way)
         self.declare(Step(path_integral_step, numbers, state), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
