@@ -16,7 +16,12 @@ from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.planning.safety_filter import turning_distance_m
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.occupancy_grid import CELL_M, OccupancyGrid, free_grid
+from systems.routes.occupancy_grid import (
+    CELL_M,
+    OccupancyGrid,
+    free_grid,
+    sorted_discs,
+)
 from systems.routes.parameters import RouteParameters
 from systems.routes.route import (
     ROUTE_POINTS,
@@ -262,7 +267,8 @@ def _make_step(
         raise InputError(f"{group}{field}", error.message) from error
     grid = free_grid([start, goal], rectangles)
     clearances = np.full(ROUTE_POINTS, np.inf)
-    fill_clearances(clearances, route.points, rectangles, np.empty((0, 3)))
+    no_discs = sorted_discs(np.empty((0, 3)))
+    fill_clearances(clearances, route.points, rectangles, no_discs)
     numbers = PlannerNumbers(
         grid,
         rectangles,

@@ -25,6 +25,7 @@ from systems.routes.occupancy_grid import (
     cell_middle,
     cell_of,
     free_grid,
+    sorted_discs,
 )
 from systems.world.geometry import beyond_rectangle, segment_clearance
 
@@ -115,6 +116,19 @@ def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compile
 
 
 @njit(cache=True)
+def _first_from(rows: Any, x: float) -> int:  # pragma: no cover  (compiled)
+    """Returns the index of the first of sorted discs with a middle from ``x`` on."""
+    low, high = 0, len(rows)
+    while low < high:
+        middle = (low + high) // 2
+        if rows[middle, 0] < x:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True)
 def _clearance(
     a: Any, b: Any, rectangles: Any, discs: Discs, least: float, most: float
 ) -> float:  # pragma: no cover  (compiled)
@@ -128,10 +142,14 @@ def _clearance(
     squared = max(dx * dx + dy * dy, 1e-18)
     low_x, high_x = min(dx, 0.0), max(dx, 0.0)
     low_y, high_y = min(dy, 0.0), max(dy, 0.0)
-    for k in range(len(discs)):
-        x, y = discs[k, 0] - a[0], discs[k, 1] - a[1]
-        reach = max(best + discs[k, 2], 0.0)
-        # Most discs are outside the rectangle around the segment.
+    farthest = max(best + discs.largest, 0.0)
+    rows = discs.rows
+    for k in range(_first_from(rows, a[0] + low_x - farthest), len(rows)):
+        x, y = rows[k, 0] - a[0], rows[k, 1] - a[1]
+        if x > high_x + farthest:
+            break
+        reach = max(best + rows[k, 2], 0.0)
+        # Most of the discs are outside the rectangle around the segment.
         if x < low_x - reach or x > high_x + reach:
             continue
         if y < low_y - reach or y > high_y + reach:
@@ -139,9 +157,10 @@ def _clearance(
         part = min(max((x * dx + y * dy) / squared, 0.0), 1.0)
         x, y = x - part * dx, y - part * dy
         if x * x + y * y < reach * reach:
-            best = math.hypot(x, y) - discs[k, 2]
+            best = math.hypot(x, y) - rows[k, 2]
             if best < least:
                 return best
+            farthest = max(best + discs.largest, 0.0)
     for k in range(len(rectangles)):
         box = rectangles[k]
         # Skip the exact distance if the circles around segment and obstacle are far
@@ -167,7 +186,7 @@ def place_clearance(
         y: y coordinate of the point in W, m.
         rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
             radius) in W, m and rad.
-        discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
+        discs: Further obstacles.
 
     Returns:
         Distance, m. It is 0 inside a rectangle, negative inside a disc, and infinite
@@ -177,9 +196,9 @@ def place_clearance(
     for k in range(len(rectangles)):
         du, dv = beyond_rectangle((x, y), rectangles[k])
         best = min(best, math.hypot(du, dv))
-    for k in range(len(discs)):
-        off = math.hypot(discs[k, 0] - x, discs[k, 1] - y)
-        best = min(best, off - discs[k, 2])
+    for disc in discs.rows:
+        off = math.hypot(disc[0] - x, disc[1] - y)
+        best = min(best, off - disc[2])
     return best
 
 
@@ -362,7 +381,7 @@ def find_route(
         goal: (x, y) in W, m.
         rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
             radius) in W, m and rad.
-        discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
+        discs: Further obstacles.
         clearance: Distance that the route keeps from obstacles, m.
 
     Returns:
@@ -426,7 +445,7 @@ def find_widest_route(
         goal: (x, y) in W, m.
         rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
             radius) in W, m and rad.
-        discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
+        discs: Further obstacles.
         clearances: (c,) clearances to try, m.
         seen_m: Least distance of the route from the discs, m.
 
@@ -437,8 +456,9 @@ def find_widest_route(
     points = np.empty((0, 2))
     for clearance in clearances:
         grid = OccupancyGrid(free.blocked.copy(), free.low)
-        grown = discs.copy()
-        grown[:, 2] += max(seen_m - clearance, 0.0)
+        rows, more = discs.rows.copy(), max(seen_m - clearance, 0.0)
+        rows[:, 2] += more
+        grown = Discs(rows, discs.largest + more)
         block_rectangles(grid, rectangles, clearance)
         block_discs(grid, grown, clearance)
         points = find_route(grid, start, goal, rectangles, grown, clearance)
@@ -458,7 +478,7 @@ def fill_clearances(
         points: (n, 2) points of the route in the world frame W, m.
         rectangles: (k, 6) rectangles of obstacles (x, y, theta, length, width,
             radius) in W, m and rad.
-        discs: (n, 3) further obstacles. Each row is (x, y, radius), m, in W.
+        discs: Further obstacles.
     """
     for k in range(len(points)):
         clearances[k] = _clearance(
@@ -530,7 +550,7 @@ def plan_route(
     grid. Hart, Nilsson and Raphael (1968) describe A*.
     """
     known: NDArray[np.float64] = np.array(rectangles, dtype=float).reshape(-1, 6)
-    discs: NDArray[np.float64] = np.empty((0, 3))
+    discs = sorted_discs(np.empty((0, 3)))
     # Integers would trigger a new compilation.
     start = float(start[0]), float(start[1])
     goal = float(goal[0]), float(goal[1])

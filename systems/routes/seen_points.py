@@ -21,7 +21,12 @@ from systems.ranging.objects import (
     is_on_map,
 )
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.occupancy_grid import OccupancyGrid, cell_of
+from systems.routes.occupancy_grid import (
+    Discs,
+    OccupancyGrid,
+    cell_of,
+    sorted_discs,
+)
 
 #: Largest number of remembered points; further points replace the oldest.
 _MOST_POINTS = 4_000
@@ -104,7 +109,7 @@ def remember_objects(
 @njit(cache=True)
 def discs_to_avoid(
     seen: SeenPoints, objects: Any, p_WP: Any
-) -> Any:  # pragma: no cover  (compiled)
+) -> Discs:  # pragma: no cover  (compiled)
     """Lists the discs that a new route has to avoid: seen points and robots at rest.
 
     Args:
@@ -113,8 +118,7 @@ def discs_to_avoid(
         p_WP: (x, y) of the control point P in the world frame W, m.
 
     Returns:
-        (n, 3) discs. Each row is (x, y, radius), m, in W. Seen points have the radius
-        0.
+        The discs. Seen points have the radius 0.
     """
     count = min(seen.added[0], len(seen.points))
     discs = np.zeros((count + OBJECT_SLOTS, 3))
@@ -132,4 +136,4 @@ def discs_to_avoid(
         discs[count, 0], discs[count, 1] = p_WP[0] + longer * x, p_WP[1] + longer * y
         discs[count, 2] = radius
         count += 1
-    return discs[:count].copy()
+    return sorted_discs(discs[:count])

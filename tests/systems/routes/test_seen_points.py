@@ -86,6 +86,9 @@ def test_routes_keep_off_robots_that_rest_for_now():
     rests, moves = (1, 0, -0.8, 0, 0, 1, 0.15, 1), (1, 0.9, 0, 0, 0.1, 1, 0.15, 1)
     port = slots(box, rests, moves)
     remember_objects(seen, grid, NOTHING, port, P)
-    expected = [[1.1, -0.5, 0.0], [0.5, -0.5 - 0.95, 0.15]]
-    assert discs_to_avoid(seen, port, P) == pytest.approx(np.array(expected))
-    assert discs_to_avoid(seen, slots(), P) == pytest.approx(np.array(expected[:1]))
+    expected = [[0.5, -0.5 - 0.95, 0.15], [1.1, -0.5, 0.0]]
+    discs = discs_to_avoid(seen, port, P)
+    assert discs.rows == pytest.approx(np.array(expected))
+    assert discs.largest == 0.15
+    only_seen = discs_to_avoid(seen, slots(), P)
+    assert only_seen.rows == pytest.approx(np.array(expected[1:]))
