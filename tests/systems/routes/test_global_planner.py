@@ -20,7 +20,8 @@ from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.global_planner import REPLANS, GlobalPlanner, planner_step
 from systems.routes.parameters import RouteParameters
 from systems.routes.path_target import PathTarget
-from systems.routes.route import ROUTE_SIZE, plan_route
+from systems.routes.route import ROUTE_SIZE
+from systems.routes.widest_route import plan_route
 from systems.world.geometry import nearest_point_on_rectangle, segment_clearance
 
 EPSILON = 0.08
