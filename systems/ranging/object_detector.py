@@ -23,6 +23,7 @@ from systems.ranging.object_tracks import (
 from systems.ranging.objects import (
     OBJECTS_PORT,
     OBJECTS_SIZE,
+    ON_MAP_M,
     VX,
     VY,
     X,
@@ -51,6 +52,8 @@ class DetectorNumbers(NamedTuple):
     """Distance of P ahead of the axle, m."""
     oldest_s: float
     """Age of a range above which its sensor counts as failed, s."""
+    half_apart_rad: float
+    """Half of the largest angle between neighboring beams, rad."""
     known: NDArray[np.float64]
     """(k, 6) rectangles of known obstacles in W."""
 
@@ -98,8 +101,12 @@ def _detect(
     )
     found = track_objects(tracks, groups[:used], p_WP, numbers.tracks)
     for slot in found:
-        moves = slot[VX] != 0.0 or slot[VY] != 0.0
-        if moves and is_on_map(p_WP[0] + slot[X], p_WP[1] + slot[Y], numbers.known):
+        if slot[VX] == 0.0 and slot[VY] == 0.0:
+            continue
+        # The nearest point of a surface is off by up to half of the spacing of beams.
+        near_m = ON_MAP_M + numbers.half_apart_rad * math.hypot(slot[X], slot[Y])
+        x, y = p_WP[0] + slot[X], p_WP[1] + slot[Y]
+        if is_on_map(x, y, numbers.known, near_m):
             slot[VX] = slot[VY] = 0.0
     return found
 
@@ -143,8 +150,8 @@ class ObjectDetector(Block):
       with 72 beams, and 7 % with 360 beams.
     - While the robot turns, bodies at rest seem to move. Their apparent speed is up to
       0.3 m/s with 36 beams, 0.12 m/s with 72 beams, and 0 m/s with 360 beams. Objects
-      whose nearest point is within 0.1 m of a known obstacle count as parts of it, so
-      their velocity is 0.
+      whose nearest point is on a known obstacle, within 0.1 m and half of the spacing
+      of the beams, count as parts of it, so their velocity is 0.
     - Where the spacing of the beams exceeds 0.25 m, no velocity is known. With 7 beams,
       this is the case at distances above 0.48 m.
 
@@ -221,5 +228,6 @@ def _numbers(
         TrackNumbers(math.hypot(NOISE_M, sensors.noise_m), tick_s),
         robot.control_point_m,
         oldest_s=(sensors.round_ticks(tick_s) + 0.5) * tick_s,
+        half_apart_rad=0.5 * float(np.max(apart)),
         known=_rectangles(known),
     )

@@ -37,12 +37,12 @@ OBJECTS_PORT = Port(
 
 #: An object whose nearest point is this near to a known obstacle is part of it, m (our
 #: choice).
-_ON_MAP_M = 0.1
+ON_MAP_M = 0.1
 
 
 @njit(cache=True)
 def is_on_map(
-    x: float, y: float, rectangles: Any
+    x: float, y: float, rectangles: Any, near_m: float = ON_MAP_M
 ) -> bool:  # pragma: no cover  (compiled)
     """Checks whether the nearest point of an object belongs to a known obstacle.
 
@@ -51,13 +51,14 @@ def is_on_map(
         y: y coordinate of the point in W, m.
         rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
             radius) in W, m and rad.
+        near_m: Distance from a known obstacle below which the point belongs to it, m.
 
     Returns:
-        Whether a known obstacle is within ``_ON_MAP_M`` of the point.
+        Whether a known obstacle is nearer to the point than ``near_m``.
     """
     for k in range(len(rectangles)):
         du, dv = beyond_rectangle((x, y), rectangles[k])
-        if math.hypot(du, dv) < _ON_MAP_M:
+        if math.hypot(du, dv) < near_m:
             return True
     return False
 
