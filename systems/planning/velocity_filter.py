@@ -10,9 +10,18 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.planning.half_planes import nearest_velocity
-from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
+from systems.ranging.objects import (
+    KNOWN,
+    RADIUS,
+    ROBOT,
+    THERE,
+    VX,
+    VY,
+    X,
+    Y,
+    is_on_map,
+)
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.world.geometry import beyond_rectangle
 
 #: Objects below this speed count as at rest, m/s.
 _RESTS_M_S = 0.02
@@ -25,8 +34,6 @@ _HORIZON_S = 4.0
 #: Time within which the robot leaves a moving object that has come too near, s (our
 #: choice).
 _LEAVE_S = 0.1
-#: An object at rest this near to a known obstacle is part of it, m (our choice).
-_ON_MAP_M = 0.1
 #: An object nearer to P than this distance, m, has no defined direction and is ignored.
 _TOUCHES_M = 1e-9
 
@@ -133,7 +140,7 @@ def _moves(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
 def without_known(
     objects: Any, p_WP: Any, rectangles: Any
 ) -> Any:  # pragma: no cover  (compiled)
-    """Returns the objects that are not on the map.
+    """Returns the objects that are not on the map (``is_on_map``).
 
     Args:
         objects: (64,) value of the port ``objects_W``.
@@ -142,8 +149,7 @@ def without_known(
             radius) in W, m and rad.
 
     Returns:
-        (64,) copy without the objects at rest whose nearest point is within
-        ``_ON_MAP_M`` of a known obstacle.
+        (64,) copy without the objects at rest that are part of a known obstacle.
     """
     others = objects.copy()
     for slot in range(OBJECT_SLOTS):
@@ -151,11 +157,8 @@ def without_known(
         if objects[at + ROBOT] > 0.5 or _moves(objects, at):
             continue
         x, y = p_WP[0] + objects[at + X], p_WP[1] + objects[at + Y]
-        for k in range(len(rectangles)):
-            du, dv = beyond_rectangle((x, y), rectangles[k])
-            if math.hypot(du, dv) < _ON_MAP_M:
-                others[at + THERE] = 0.0
-                break
+        if is_on_map(x, y, rectangles):
+            others[at + THERE] = 0.0
     return others
 
 

@@ -6,10 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from systems.base.robot import RobotParameters
-from systems.framework.block import Block, Port, Step
+from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.ranging.beam_groups import BeamNumbers, group_beams
@@ -20,7 +20,16 @@ from systems.ranging.object_tracks import (
     TrackNumbers,
     track_objects,
 )
-from systems.ranging.objects import OBJECTS_PORT, OBJECTS_SIZE
+from systems.ranging.objects import (
+    OBJECTS_PORT,
+    OBJECTS_SIZE,
+    ON_MAP_M,
+    VX,
+    VY,
+    X,
+    Y,
+    is_on_map,
+)
 from systems.ranging.parameters import OBJECT_SIZE, UltrasonicParameters
 from systems.world.geometry import control_point
 
@@ -43,6 +52,10 @@ class DetectorNumbers(NamedTuple):
     """Distance of P ahead of the axle, m."""
     oldest_s: float
     """Age of a range above which its sensor counts as failed, s."""
+    half_apart_rad: float
+    """Half of the largest angle between neighboring beams, rad."""
+    known: NDArray[np.float64]
+    """(k, 6) rectangles of known obstacles in W."""
 
 
 @njit(cache=True)
@@ -86,7 +99,16 @@ def _detect(
     groups, used = group_beams(
         hits, kept[:, _RANGE].copy(), kept[:, _HEARD].copy(), numbers.beams
     )
-    return track_objects(tracks, groups[:used], p_WP, numbers.tracks)
+    found = track_objects(tracks, groups[:used], p_WP, numbers.tracks)
+    for slot in found:
+        if slot[VX] == 0.0 and slot[VY] == 0.0:
+            continue
+        # The nearest point of a surface is off by up to half of the spacing of beams.
+        near_m = ON_MAP_M + numbers.half_apart_rad * math.hypot(slot[X], slot[Y])
+        x, y = p_WP[0] + slot[X], p_WP[1] + slot[Y]
+        if is_on_map(x, y, numbers.known, near_m):
+            slot[VX] = slot[VY] = 0.0
+    return found
 
 
 def object_detector_step(
@@ -127,7 +149,9 @@ class ObjectDetector(Block):
       view, the median error of their velocities is 25 % with 36 beams all around, 15 %
       with 72 beams, and 7 % with 360 beams.
     - While the robot turns, bodies at rest seem to move. Their apparent speed is up to
-      0.3 m/s with 36 beams, 0.12 m/s with 72 beams, and 0 m/s with 360 beams.
+      0.3 m/s with 36 beams, 0.12 m/s with 72 beams, and 0 m/s with 360 beams. Objects
+      whose nearest point is on a known obstacle, within 0.1 m and half of the spacing
+      of the beams, count as parts of it, so their velocity is 0.
     - Where the spacing of the beams exceeds 0.25 m, no velocity is known. With 7 beams,
       this is the case at distances above 0.48 m.
 
@@ -138,6 +162,8 @@ class ObjectDetector(Block):
     Args:
         sensors: Positions, directions, and firing period of the beams.
         robot: Distance of P ahead of the axle.
+        known: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
+            radius) in the world frame W, m and rad. They are at rest.
         tick_s: Control period, s.
 
     Reference: our own work. Engelbrecht, Steyn and Djouani (2021) state neither how
@@ -160,22 +186,36 @@ class ObjectDetector(Block):
         *,
         sensors: UltrasonicParameters = UltrasonicParameters(),
         robot: RobotParameters = RobotParameters(),
+        known: ArrayLike = (),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self.set_name("object_detector")
-        numbers = _numbers(sensors, robot, tick_s)
+        numbers = _numbers(sensors, robot, known, tick_s)
         size = _BEAM_SIZE * sensors.count + TRACKS * TRACK_SIZE
+        self._step = Step(object_detector_step, numbers, [0.0] * size)
         self.declare(
-            Step(object_detector_step, numbers, [0.0] * size),
+            self._step,
             tick_s=tick_s,
             sizes={"sensors": sensors.count},
             arrays=True,
         )
 
+    def step_for(self, run: RunFacts) -> Step:
+        """Returns the step with the map of the run."""
+        known = _rectangles(run.mapped)
+        return self._step._replace(numbers=self._step.numbers._replace(known=known))
+
+
+def _rectangles(known: ArrayLike) -> NDArray[np.float64]:
+    return np.array(known, dtype=float).reshape(-1, 6)
+
 
 def _numbers(
-    sensors: UltrasonicParameters, robot: RobotParameters, tick_s: float
+    sensors: UltrasonicParameters,
+    robot: RobotParameters,
+    known: ArrayLike,
+    tick_s: float,
 ) -> DetectorNumbers:
     apart = np.zeros(sensors.count)
     for left, right in sensors.neighbors:
@@ -188,4 +228,6 @@ def _numbers(
         TrackNumbers(math.hypot(NOISE_M, sensors.noise_m), tick_s),
         robot.control_point_m,
         oldest_s=(sensors.round_ticks(tick_s) + 0.5) * tick_s,
+        half_apart_rad=0.5 * float(np.max(apart)),
+        known=_rectangles(known),
     )

@@ -77,16 +77,28 @@ class TrackNumbers(NamedTuple):
 
 
 @njit(cache=True)
+def _motion_is_known(
+    track: Any, own: TrackNumbers
+) -> bool:  # pragma: no cover  (compiled)
+    """Returns whether the motion has been visible for long enough."""
+    return bool(track[_SURE] > _CONFIRMATION_S - 0.5 * own.tick_s)
+
+
+@njit(cache=True)
 def _move_on(track: Any, own: TrackNumbers) -> None:  # pragma: no cover  (compiled)
     """Predicts a track one control period ahead.
 
-    The model has a constant velocity and white noise of the acceleration.
+    The model has a constant velocity and white noise of the acceleration. An object
+    whose velocity is not known stays where it was seen: the edge of a shadow can move
+    along a wall at several meters per second.
     """
     t = own.tick_s
     track[_UNSEEN] += t
+    known = _motion_is_known(track, own)
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
     for i in range(2):
-        track[_QX + i] += t * state[2 + i]
+        if known:
+            track[_QX + i] += t * state[2 + i]
         state[i] += t * state[2 + i]
     # Covariance F P F^T: first the rows, then the columns.
     for i in range(4):
@@ -325,7 +337,7 @@ def track_objects(
             continue
         slot[THERE], slot[RADIUS] = 1.0, track[_RADIUS]
         slot[X], slot[Y] = track[_QX] - p_WP[0], track[_QY] - p_WP[1]
-        if track[_SURE] > _CONFIRMATION_S - 0.5 * own.tick_s:
+        if _motion_is_known(track, own):
             slot[KNOWN] = 1.0
             vx, vy = track[_STATE + 2], track[_STATE + 3]
             if math.hypot(vx, vy) > _RESTING_M_S:

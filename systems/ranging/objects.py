@@ -15,6 +15,7 @@ slot has these elements:
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ import numpy as np
 from systems.framework.block import Port
 from systems.framework.compiling import njit
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
+from systems.world.geometry import beyond_rectangle
 
 THERE, X, Y, VX, VY, KNOWN, RADIUS, ROBOT = range(8)
 #: Number of elements of the port.
@@ -32,6 +34,33 @@ OBJECTS_PORT = Port(
     OBJECTS_SIZE,
     "number, m and m/s in eight slots, see systems.ranging.objects",
 )
+
+#: An object whose nearest point is this near to a known obstacle is part of it, m (our
+#: choice).
+ON_MAP_M = 0.1
+
+
+@njit(cache=True)
+def is_on_map(
+    x: float, y: float, rectangles: Any, near_m: float = ON_MAP_M
+) -> bool:  # pragma: no cover  (compiled)
+    """Checks whether the nearest point of an object belongs to a known obstacle.
+
+    Args:
+        x: x coordinate of the point in the world frame W, m.
+        y: y coordinate of the point in W, m.
+        rectangles: (k, 6) rectangles of known obstacles (x, y, theta, length, width,
+            radius) in W, m and rad.
+        near_m: Distance from a known obstacle below which the point belongs to it, m.
+
+    Returns:
+        Whether a known obstacle is nearer to the point than ``near_m``.
+    """
+    for k in range(len(rectangles)):
+        du, dv = beyond_rectangle((x, y), rectangles[k])
+        if math.hypot(du, dv) < near_m:
+            return True
+    return False
 
 
 @njit(cache=True)

@@ -16,6 +16,7 @@ from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.planning.safety_filter import turning_distance_m
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
+from systems.routes.clearances import fill_clearances
 from systems.routes.occupancy_grid import (
     CELL_M,
     OccupancyGrid,
@@ -23,21 +24,17 @@ from systems.routes.occupancy_grid import (
     sorted_discs,
 )
 from systems.routes.parameters import RouteParameters
-from systems.routes.route import (
-    ROUTE_POINTS,
-    ROUTE_SIZE,
-    ROUTE_UNIT,
-    clearances_to_try,
-    fill_clearances,
-    fill_route,
-    find_widest_route,
-    plan_route,
-)
+from systems.routes.route import ROUTE_POINTS, ROUTE_SIZE, ROUTE_UNIT, fill_route
 from systems.routes.seen_points import (
     SeenPoints,
     discs_to_avoid,
     make_seen_points,
     remember_objects,
+)
+from systems.routes.widest_route import (
+    clearances_to_try,
+    find_widest_route,
+    plan_route,
 )
 from systems.world.geometry import control_point
 
@@ -46,8 +43,9 @@ from systems.world.geometry import control_point
 #: clearance of the route near P, m.
 REPLANS, SINCE_S, FROM_M, CLEARANCE_M = range(4)
 #: The robot stalls if P advances along the route by less than ``_STALL_M``, m, within
-#: ``_STALLED_S``, s.
-_STALL_M, _STALLED_S = 0.1, 6.0
+#: ``_STALLED_S``, s, or within ``_BLOCKED_S``, s, where a seen obstacle blocks the next
+#: ``_AHEAD_M``, m, of the route.
+_STALL_M, _STALLED_S, _BLOCKED_S, _AHEAD_M = 0.1, 6.0, 2.0, 1.0
 #: Distance from the goal within which the robot has arrived and does not stall, m.
 _ARRIVED_M = 0.05
 #: Largest value of the port ``route_clearance``, m.
@@ -128,6 +126,26 @@ def _clearance_at(
     return float(near + part * (far - near) if far < np.inf else near)
 
 
+@njit(cache=True)
+def _is_blocked(
+    numbers: PlannerNumbers, state: PlannerState, along: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Returns whether a seen point is too near to the route ahead of an arc length."""
+    route, seen = state.route, state.seen
+    count, spacing = int(route[0]), route[1]
+    first = min(max(int(along / spacing), 0), count - 1)
+    last = min(first + math.ceil(_AHEAD_M / spacing), count - 1)
+    # New routes keep ``seen_m``, apart from less than a cell.
+    near = numbers.seen_m - CELL_M
+    for p in range(min(seen.added[0], len(seen.points))):
+        x, y = seen.points[p, 0], seen.points[p, 1]
+        for k in range(first, last + 1):
+            dx, dy = route[2 + 2 * k] - x, route[3 + 2 * k] - y
+            if dx * dx + dy * dy < near * near:
+                return True
+    return False
+
+
 def planner_step(
     tick: int, state: PlannerState, inputs: Any, outputs: Any, numbers: PlannerNumbers
 ) -> None:
@@ -149,7 +167,10 @@ def planner_step(
     if reached >= progress[FROM_M] + _STALL_M or away <= _ARRIVED_M:
         progress[FROM_M], progress[SINCE_S] = reached, time
     # Half a tick exceeds the rounding of times.
-    if time - progress[SINCE_S] < _STALLED_S - 0.5 * numbers.tick_s:
+    waited_s = time - progress[SINCE_S] + 0.5 * numbers.tick_s
+    if waited_s < _BLOCKED_S:
+        return
+    if waited_s < _STALLED_S and not _is_blocked(numbers, state, reached):
         return
     progress[SINCE_S], progress[FROM_M] = time, reached
     if _plan_again(numbers, state, objects, (x, y)):
@@ -181,11 +202,12 @@ class GlobalPlanner(Block):
     ``route_clearance`` is the distance from obstacles at the route's point nearest to
     P. It includes all obstacles that the planner knew when it made the route.
 
-    The robot stalls if P advances by less than 10 cm along the route in 6 s. Within 5
-    cm of the goal, it does not count as stalled. If the robot stalls, the block plans a
-    new route from the position of P. This route also avoids the remembered points and
-    robots at rest. If there is no such route, the block keeps the old route and tries
-    again after 6 s.
+    The robot stalls if P advances by less than 10 cm along the route in 6 s, or in 2 s
+    where a remembered point blocks the next meter of the route. Within 5 cm of the
+    goal, it does not count as stalled. If the robot stalls, the block plans a new route
+    from the position of P. This route also avoids the remembered points and robots at
+    rest. If there is no such route, the block keeps the old route and tries again after
+    the same time.
 
     The discrete state is ``PlannerState``. A new route appears at the output one
     control period after the inputs that cause it. There is no feedthrough.

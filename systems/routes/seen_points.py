@@ -9,21 +9,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
-from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
+from systems.ranging.objects import (
+    KNOWN,
+    RADIUS,
+    ROBOT,
+    THERE,
+    VX,
+    VY,
+    X,
+    Y,
+    is_on_map,
+)
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import (
-    CELL_M,
     Discs,
     OccupancyGrid,
     cell_of,
     sorted_discs,
 )
-from systems.routes.route import place_clearance
 
 #: Largest number of remembered points; further points replace the oldest.
 _MOST_POINTS = 4_000
 #: Objects below this speed count as at rest, m/s.
 _RESTS_M_S = 0.02
+#: Objects farther away than this are not remembered, m (our choice). The beams of a
+#: lidar are so far apart there that the nearest point of a wall may be off the wall.
+_REACH_M = 2.0
 
 
 class SeenPoints(NamedTuple):
@@ -60,7 +71,7 @@ def remember_objects(
     """Remembers the nearest points of the objects that are not known to move.
 
     The function ignores other robots, because they will move sooner or later. It also
-    ignores points near known obstacles.
+    ignores parts of known obstacles (``is_on_map``).
 
     Args:
         seen: Memory of points, modified in place.
@@ -70,18 +81,19 @@ def remember_objects(
         objects: (64,) value of the port ``objects_W``, which lists the seen objects.
         p_WP: (x, y) of the control point P in W, m.
     """
-    no_discs = sorted_discs(np.empty((0, 3)))
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE
         if objects[at + THERE] < 0.5 or objects[at + ROBOT] > 0.5:
             continue
         if _moves(objects, at):
             continue
+        if math.hypot(objects[at + X], objects[at + Y]) > _REACH_M:
+            continue
         x, y = p_WP[0] + objects[at + X], p_WP[1] + objects[at + Y]
         i, j = cell_of(grid, x, y)
         if i < 0 or seen.taken[i, j]:
             continue
-        if place_clearance(x, y, rectangles, no_discs) < CELL_M:
+        if is_on_map(x, y, rectangles):
             continue
         # With a full memory, replace the oldest point.
         most = len(seen.points)

@@ -129,7 +129,12 @@ def _seen_objects(
             seed=seed_of("ultrasonic_array"),
             tick_s=tick_s,
         ),
-        ObjectDetector(sensors=router.ultrasonic, robot=robot, tick_s=tick_s),
+        ObjectDetector(
+            sensors=router.ultrasonic,
+            robot=robot,
+            known=scenario.mapped(),
+            tick_s=tick_s,
+        ),
     ]
 
 

@@ -228,11 +228,22 @@ def test_a_wall_may_be_cut_into_pieces():
     assert np.max(ends[0][1]) > 0.1
 
 
-def test_a_pioneer_passes_a_door_that_leaves_6_cm_on_each_side():
-    """Straight on and at an angle, without contact; in its width it could not turn."""
+@pytest.mark.parametrize(
+    ("half_m", "sensing"),
+    [
+        (0.25, {"obstacle_sensing": "ideal"}),
+        (0.29, {"obstacle_sensing": "ultrasonic", "ultrasonic": {"preset": "lidar"}}),
+    ],
+    ids=["6 cm on each side", "10 cm with a lidar"],
+)
+def test_a_pioneer_passes_a_door_in_whose_width_it_could_not_turn(half_m, sensing):
+    """Straight on and at an angle, without contact.
+
+    For beams, the edges of the door and their shadows seem to move.
+    """
     for y in (0.0, 1.0):
         doors = [
-            {"name": f"wall {side}", "waypoints_m": [[3.0, side * 1.25]],
+            {"name": f"wall {side}", "waypoints_m": [[3.0, side * (1.0 + half_m)]],
              "size_m": [0.2, 2.0]}
             for side in (-1, 1)
         ]  # fmt: skip
@@ -250,6 +261,7 @@ def test_a_pioneer_passes_a_door_that_leaves_6_cm_on_each_side():
             "start.position_m": [0.0, y],
             "route.goal_m": [6.0, y],
             "obstacles": doors + ends + sides,
+            **sensing,
         }
         result = simulate(load_scenario("unknown_block", changes), engine="compiled")
         assert result.cause == "reached", y

@@ -10,7 +10,7 @@ from PIL import Image
 
 from diagrams import load_scenario, simulate, write_scenario
 from systems.framework.input_error import InputError
-from systems.routes.route import plan_route
+from systems.routes.widest_route import plan_route
 
 #: A wall from x = 2 to 2.2 m, made of two rectangles: 4 m long with a notch.
 WALL = {"origin": "[-1.0, -3.0, 0.0]", "resolution": 0.1}

@@ -32,9 +32,11 @@ def ring(count: int, **fields: Any) -> UltrasonicParameters:
 class Driven:
     """A detector that is driven tick by tick."""
 
-    def __init__(self, sensors: UltrasonicParameters = SCAN) -> None:
+    def __init__(
+        self, sensors: UltrasonicParameters = SCAN, known: Any = ()
+    ) -> None:
         self.sensors = sensors
-        self.block = ObjectDetector(sensors=sensors, robot=BURGER)
+        self.block = ObjectDetector(sensors=sensors, robot=BURGER, known=known)
         self.state, self.tick = np.array(self.block.step.state), 0
 
     def see(self, ranges: Any, pose: Any = REST, ages: Any = None) -> Any:
@@ -199,6 +201,25 @@ def test_what_comes_straight_at_it_is_timed_well_by_any_ring():
             objects = driven.look([1.3 - 0.2 * 0.025 * tick, 0.0, 0.0, 0.1, 0.1])
         assert objects[0, KNOWN] == 1.0
         assert objects[0, [VX, VY]] == pytest.approx([-0.2, 0.0], abs=0.004)
+
+
+def test_what_is_on_the_map_rests():
+    """The same box, where the map has an obstacle from 1 to 1.3 m."""
+    driven = Driven(ring(72), [(1.15, 0.0, 0.0, 0.3, 0.1, 0.0)])
+    for tick in range(41):
+        objects = driven.look([1.3 - 0.2 * 0.025 * tick, 0.0, 0.0, 0.1, 0.1])
+    assert objects[0, X] == pytest.approx(1.05, abs=0.01)
+    assert objects[0, [KNOWN, VX, VY]].tolist() == [1.0, 0.0, 0.0]
+
+
+def test_what_no_beam_hits_any_more_stays_if_its_motion_is_unknown():
+    """The edge of a shadow on a wall, which came at 6 m/s."""
+    driven = Driven()
+    for ahead in (1.8, 1.65, 1.5, 1.35, 1.2):
+        objects = driven.see([math.inf] * 3 + [ahead] + [math.inf] * 3)
+    for _ in range(20):
+        assert objects[0, [X, KNOWN]] == pytest.approx([1.2, 0.0], abs=1e-9)
+        objects = driven.look()
 
 
 def test_of_beams_that_are_far_apart_no_velocity_is_known():

@@ -20,7 +20,8 @@ from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.global_planner import REPLANS, GlobalPlanner, planner_step
 from systems.routes.parameters import RouteParameters
 from systems.routes.path_target import PathTarget
-from systems.routes.route import ROUTE_SIZE, plan_route
+from systems.routes.route import ROUTE_SIZE
+from systems.routes.widest_route import plan_route
 from systems.world.geometry import nearest_point_on_rectangle, segment_clearance
 
 EPSILON = 0.08
@@ -232,20 +233,24 @@ def ticks_of_replans(planner, tick, objects, pose, count, progress=(0.5, 0.3)):
 
 
 STANDS = (1.0 - EPSILON, 0.0, 0.0)
-POST = [(1.4, 0.0, 0.0, 0.1, 0.1, 0.0)]
 
 
-def test_it_plans_anew_after_6_s_without_way(compiled_tick):
+@pytest.mark.parametrize(("aside", "at"), [(0.0, 80), (0.9, 240)])
+def test_it_plans_anew_after_2_s_where_it_is_blocked_else_after_6_s(
+    aside, at, compiled_tick
+):
     """P is 0.3 m along from the first tick on: that is way made, at 0 s."""
-    objects = objects_at(1.0, 0.0, POST)
+    post = [(1.4, aside, 0.0, 0.1, 0.1, 0.0)]
+    objects = objects_at(1.0, 0.0, post)
     changed, state = ticks_of_replans(make(), compiled_tick, objects, STANDS, 300)
     # From then on the route is known: planned again from the same place it is the same.
-    assert changed == [240]
+    assert changed == [at]
     route = state.route[2:].reshape(-1, 2)[: int(state.route[0])]
     assert route[0] == pytest.approx([1.0, 0.0])
     assert route[-1] == pytest.approx([4.0, 0.0])
-    # What is known is the nearest point, (1.35, 0).
-    assert np.hypot(*(route - [1.35, 0.0]).T).min() >= 0.35 - 0.02
+    # What is known is the nearest point, on the left face of the post.
+    nearest = [1.35, max(aside - 0.05, 0.0)]
+    assert np.hypot(*(route - nearest).T).min() >= 0.35 - 0.02
 
 
 def test_who_is_at_the_goal_does_not_stall(compiled_tick):

@@ -18,7 +18,8 @@ from systems.routes.path_target import (
     nearest_on_route,
     point_on_route,
 )
-from systems.routes.route import ROUTE_SIZE, Route, plan_route
+from systems.routes.route import ROUTE_SIZE, Route
+from systems.routes.widest_route import plan_route
 from systems.world.paths import WaypointPath
 
 EPSILON = 0.08

@@ -10,7 +10,8 @@ import pytest
 
 from analysis.runs.shortest_path import shortest_path_length
 from systems.framework.input_error import InputError
-from systems.routes.route import ROUTE_SIZE, plan_route
+from systems.routes.route import ROUTE_SIZE
+from systems.routes.widest_route import plan_route
 from systems.world.geometry import rectangle_corners
 
 CLEARANCE = 0.35

@@ -13,7 +13,7 @@ from systems.routes.seen_points import (
     remember_objects,
 )
 
-ARENA = (-3.0, -3.0, 3.0, 3.0)
+ARENA = (-2.0, -2.0, 2.0, 2.0)
 P = (0.5, -0.5)
 NOTHING = np.empty((0, 6))
 
@@ -47,9 +47,10 @@ def test_nearest_points_of_what_rests_or_may_rest():
         (0, 0.6, 0.0, 0, 0, 0, 0, 0),
         (1, 0.6, 0.0, 0.1, 0, 1, 0.2, 0),
         (1, 0.6, 0.0, 0, 0, 1, 0.2, 1),
-        (1, 2.6, 0.0, 0, 0, 1, 0, 0),
+        (1, 1.6, 0.0, 0, 0, 1, 0, 0),
+        (1, -2.1, 0.0, 0, 0, 1, 0, 0),
     ],
-    ids=["empty", "moves", "robot", "off the arena"],
+    ids=["empty", "moves", "robot", "off the arena", "far"],
 )
 def test_what_is_not_remembered(slot):
     assert len(remembered(slot)) == 0
@@ -69,8 +70,8 @@ def test_one_point_a_cell_and_the_oldest_are_forgotten():
     for k in range(5000):
         x, y = 0.05 * (k % 120) + 0.02, 0.05 * (k // 120) + 0.01
         for shift in (0.0, 0.02):
-            port = slots((1, x + shift - P[0], y - P[1], 0, 0, 0, 0, 0))
-            remember_objects(seen, grid, NOTHING, port, P)
+            port = slots((1, shift, 0, 0, 0, 0, 0, 0))
+            remember_objects(seen, grid, NOTHING, port, (x, y))
     assert seen.added[0] == 5000
     assert seen.taken.sum() == 4000
     # The first thousand made room for the last.
