@@ -35,8 +35,6 @@ class FreeSpace(NamedTuple):
     the position of the cell is too uncertain. The value is ``NEVER`` if the cell was
     not seen free.
     """
-    seen_s: NDArray[np.float64]
-    """(n, n) time at which a cell was last seen free, s, or ``NEVER``."""
     hits: NDArray[np.float64]
     """(n, n) weighted number of echoes from each cell since the cell was last seen
     free.
@@ -77,7 +75,6 @@ def make_free_space(
         The map.
     """
     return FreeSpace(
-        np.full((cells, cells), NEVER),
         np.full((cells, cells), NEVER),
         np.zeros((cells, cells)),
         np.zeros((cells, cells)),
@@ -160,7 +157,6 @@ def move_window(
             for other in range(cells):
                 i, j = (k % cells, other) if axis == 0 else (other, k % cells)
                 space.free_until[i, j] = NEVER
-                space.seen_s[i, j] = NEVER
                 space.hits[i, j] = 0.0
                 space.evidence[i, j] = 0.0
         space.first[axis] = wanted

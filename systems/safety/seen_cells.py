@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
@@ -32,15 +32,9 @@ _FULL_HIT_M = 0.6
 _OUT_OF_VIEW = -1.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def see(
-    space: FreeSpace,
-    time: float,
-    turn: int,
-    pose: Any,
-    sectors: Sectors,
-    readings: Any,
-    error: Any,
+    space: FreeSpace, turn: int, pose: Any, sectors: Sectors, readings: Any, error: Any
 ) -> None:  # pragma: no cover  (compiled)
     """Enters the newest readings of the sensors into the map of free space.
 
@@ -65,7 +59,6 @@ def see(
 
     Args:
         space: Map of free space. The function changes the map in place.
-        time: Current time, s.
         turn: Number of the call. One call updates only every fourth row of cells. The
             next call updates other rows.
         pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
@@ -81,7 +74,7 @@ def see(
     # Radius of the circle around a cell.
     half = cell * math.sqrt(0.5)
     seen = _of_sectors(sectors, readings)
-    row = np.empty((cells, 3))
+    row = np.empty((4, cells))
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
@@ -95,7 +88,7 @@ def see(
             sx, sy, pose[2] + right, pose[2] + left, farthest + cell
         )
         low_i, low_j, high_i, high_j = cells_within(space, low_x, low_y, high_x, high_y)
-        edges, views = _view_of(sectors, seen, begin, end, pose[2])
+        view = _view_of(sectors, seen, begin, end, pose[2], half)
         sigma = np.max(seen[begin:end, 4])
         for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
             dx = (i + 0.5) * cell - sx
@@ -105,43 +98,65 @@ def see(
             count = min(high_j, math.floor((sy + reach) / cell)) - first + 1
             if count <= 0:
                 continue
-            begin_y = (first + 0.5) * cell - sy
-            _look_along_row(dx, begin_y, cell, edges, views, row[:count])
-            at_i, at_j = i % cells, first % cells - 1
             for k in range(count):
-                at_j = at_j + 1 if at_j + 1 < cells else 0
                 dy = (first + k + 0.5) * cell - sy
-                squared = dx * dx + dy * dy
-                if squared < 4.0 * half * half:
-                    continue
-                distance = math.sqrt(squared)
-                free, far = row[k, 0] >= distance + half, distance + half
-                at = at_i, at_j
-                if free or row[k, 2] > -np.inf:
-                    until = space.rolled_m[0] + lasting(distance + from_axle, error)
-                    if not free:
-                        until = _weigh(space, at, (row[k, 2] - far) / sigma, until)
-                        free = space.evidence[at] >= _EVIDENCE
-                    if free:
-                        space.free_until[at] = max(space.free_until[at], until)
-                        space.seen_s[at] = time
-                        space.hits[at], space.evidence[at] = 0.0, 0.0
-                if not free and abs(distance - row[k, 1]) <= half:
-                    space.hits[at] += min(1.0, _FULL_HIT_M / distance)
+                row[3, k] = math.sqrt(dx * dx + dy * dy)
+            begin_y = (first + 0.5) * cell - sy
+            _look_along_row(dx, begin_y, cell, view, row[:, :count])
+            # The map stores the row in two pieces, because its indices wrap around.
+            at = first % cells
+            piece = min(count, cells - at)
+            _enter_row(space, i % cells, at, row[:, :piece], sigma, from_axle, error)
+            if piece < count:
+                rest = row[:, piece:count]
+                _enter_row(space, i % cells, 0, rest, sigma, from_axle, error)
 
 
-@register_jitable
-def _weigh(space: FreeSpace, at: Any, z: float, until: float) -> float:
-    """Adds a reading to the evidence of a cell.
+@njit(cache=True, error_model="numpy")
+def _enter_row(
+    space: FreeSpace,
+    i: int,
+    first: int,
+    row: Any,
+    sigma: float,
+    from_axle: float,
+    error: Any,
+) -> None:  # pragma: no cover  (compiled)
+    """Changes the cells of a row of the map; see ``see``.
 
-    The reading is valid until the rolled distance ``until``, m. The function returns
-    the distance until which all readings in the evidence are valid, m.
+    ``i`` is the row of the arrays, and ``first`` the first cell in it. ``row`` has what
+    the group has seen toward each cell (see ``_look_along_row``), and the distances of
+    the middles of the cells from the group, m.
     """
-    if space.evidence[at] == 0.0:
-        space.evident_until[at] = np.inf
-    space.evidence[at] = max(space.evidence[at] + z - 0.5, 0.0)
-    space.evident_until[at] = min(space.evident_until[at], until)
-    return space.evident_until[at]
+    # Radius of the circle around a cell.
+    half = space.cell_m * math.sqrt(0.5)
+    count, rolled_m = row.shape[1], space.rolled_m[0]
+    ways, echoes, least, distances = row[0], row[1], row[2], row[3]
+    free_until = space.free_until[i, first : first + count]
+    hits = space.hits[i, first : first + count]
+    evidence = space.evidence[i, first : first + count]
+    evident_until = space.evident_until[i, first : first + count]
+    for k in range(count):
+        distance = distances[k]
+        if distance < 2.0 * half:
+            continue
+        far = distance + half
+        free = ways[k] >= far
+        # A reading that is too short leaves cells without evidence as they are.
+        if free or (least[k] > -np.inf and (evidence[k] > 0.0 or least[k] > far)):
+            until = rolled_m + lasting(distance + from_axle, error)
+            if not free:
+                if evidence[k] == 0.0:
+                    evident_until[k] = np.inf
+                z = (least[k] - far) / sigma
+                evidence[k] = max(evidence[k] + z - 0.5, 0.0)
+                evident_until[k] = until = min(evident_until[k], until)
+                free = evidence[k] >= _EVIDENCE
+            if free:
+                free_until[k] = max(free_until[k], until)
+                hits[k], evidence[k] = 0.0, 0.0
+        if not free and abs(distance - echoes[k]) <= half:
+            hits[k] += min(1.0, _FULL_HIT_M / distance)
 
 
 @njit(cache=True)
@@ -158,49 +173,79 @@ def _of_sectors(
     """
     seen = np.empty((len(sectors.right), 5))
     for k in range(len(seen)):
-        free, echo, first = 0.0, np.inf, True
-        seen[k, 3], seen[k, 4] = -np.inf, 1.0
-        for sensor in range(len(readings)):
-            if sectors.seen_by[k, sensor]:
-                if first and readings[sensor, 3] > 0.0:
-                    seen[k, 3], seen[k, 4] = readings[sensor, 2], readings[sensor, 3]
-                first = False
-                free = max(free, readings[sensor, 0])
-                echo = min(echo, readings[sensor, 1])
-        seen[k, 0], seen[k, 1] = free, echo
+        seen[k, 0], seen[k, 1], seen[k, 3], seen[k, 4] = 0.0, np.inf, -np.inf, 1.0
+    last = -1
+    for n in range(len(sectors.pairs)):
+        k, sensor = sectors.pairs[n]
+        free, echo, reading, noise_m = readings[sensor]
+        if k != last and noise_m > 0.0:
+            seen[k, 3], seen[k, 4] = reading, noise_m
+        seen[k, 0], seen[k, 1] = max(seen[k, 0], free), min(seen[k, 1], echo)
+        last = k
+    for k in range(len(seen)):
+        free, echo = seen[k, 0], seen[k, 1]
         # Cells behind the echo also lose evidence.
         behind = echo + _BEHIND * seen[k, 4] if seen[k, 3] > -np.inf else echo
         seen[k, 2] = max(free, behind) if echo < np.inf else free
     return seen
 
 
-@njit(cache=True)
-def _view_of(
-    sectors: Sectors, seen: Any, begin: int, end: int, heading: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Returns the view of a group of sensors as sectors that fill the full circle.
+class _View(NamedTuple):
+    """View of a group of sensors as n sectors that fill the full circle.
 
-    Returns:
-        (n, 4) cosine, sine, tangent, and cotangent of the direction of the right edge
-        of each sector in the frame of the odometry, from right to left; and (n, 3)
-        distance seen free, distance of the echo, and reading less all errors but noise
-        in each sector, m. If the group does not see all around, the last sector is out
-        of view.
+    Neighboring sectors have seen different distances. If the group does not see all
+    around, one sector is out of view.
     """
-    count = end - begin
-    around = sectors.left[end - 1, 0] - sectors.right[begin, 0] > math.tau - 1e-9
-    size = count if around else count + 1
-    edges, views = np.empty((size, 4)), np.empty((size, 3))
-    for k in range(size):
-        angle = sectors.right[begin + k, 0] if k < count else sectors.left[end - 1, 0]
+
+    seen: NDArray[np.float64]
+    """(n, 3) distance seen free, distance of the echo, and reading less all errors but
+    noise in each sector, m."""
+    begin: float
+    """Direction of the right edge of the first sector in the frame of the odometry,
+    rad."""
+    turns: NDArray[np.float64]
+    """(n,) angle from there to the right edge of each sector, counterclockwise, rad."""
+    edges: NDArray[np.float64]
+    """(n, 7) right edge of each sector: cosine, sine, tangent, and cotangent of its
+    direction in the frame of the odometry; half of the length of the cut through the
+    circles around the cells of a row that meet it, m; and the smaller of the distances
+    seen free and of the readings on both sides, m."""
+
+
+@njit(cache=True, error_model="numpy")
+def _view_of(
+    sectors: Sectors, seen: Any, begin: int, end: int, heading: float, half: float
+) -> _View:  # pragma: no cover  (compiled)
+    """Returns the view of the group of sensors with the sectors from begin to end.
+
+    ``half`` is the radius of the circle around a cell, m.
+    """
+    start, stop = sectors.right[begin, 0], sectors.left[end - 1, 0]
+    most, count = end - begin + 1, 0
+    views, turns, edges = np.empty((most, 3)), np.empty(most), np.empty((most, 7))
+    for k in range(begin, end + 1):
+        angle, way, echo, reading = stop, _OUT_OF_VIEW, np.inf, -np.inf
+        if k < end:
+            angle, reading = sectors.right[k, 0], seen[k, 3]
+            way, echo = seen[k, 0], seen[k, 1]
+        elif stop - start > math.tau - 1e-9:
+            break  # the group sees all around
+        if count > 0:
+            last = views[count - 1]
+            if way == last[0] and echo == last[1] and reading == last[2]:
+                continue
+        views[count, 0], views[count, 1], views[count, 2] = way, echo, reading
         cosine = _not_zero(math.cos(heading + angle))
         sine = _not_zero(math.sin(heading + angle))
-        edges[k, 0], edges[k, 1] = cosine, sine
-        edges[k, 2], edges[k, 3] = sine / cosine, cosine / sine
-        views[k, 0] = seen[begin + k, 0] if k < count else _OUT_OF_VIEW
-        views[k, 1] = seen[begin + k, 1] if k < count else np.inf
-        views[k, 2] = seen[begin + k, 3] if k < count else -np.inf
-    return edges, views
+        edge = edges[count]
+        edge[0], edge[1], edge[2], edge[3] = cosine, sine, sine / cosine, cosine / sine
+        edge[4], turns[count] = half / abs(cosine), angle - start
+        count += 1
+    for k in range(count):
+        other = k - 1 if k > 0 else count - 1
+        edges[k, 5] = min(views[k, 0], views[other, 0])
+        edges[k, 6] = min(views[k, 2], views[other, 2])
+    return _View(views[:count], heading + start, turns[:count], edges[:count])
 
 
 @register_jitable
@@ -210,12 +255,7 @@ def _not_zero(value: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _look_along_row(
-    dx: float,
-    begin_y: float,
-    cell: float,
-    edges: Any,
-    views: Any,
-    row: Any,
+    dx: float, begin_y: float, cell: float, view: _View, row: Any
 ) -> None:  # pragma: no cover  (compiled)
     """Computes how far a group of sensors has seen toward the cells of a row.
 
@@ -228,72 +268,58 @@ def _look_along_row(
         dx: Position of the row relative to the group, m.
         begin_y: Position of the middle of the first cell relative to the group, m.
         cell: Side of a cell, m.
-        edges: (n, 4) edges of the sectors, see ``_view_of``.
-        views: (n, 3) what each sector has seen, see ``_view_of``.
-        row: (m, 3) array that the function fills with distance seen free, echo and
-            reading for each cell, m.
+        view: What the group has seen.
+        row: (4, m) array whose first three rows the function fills with distance seen
+            free, echo and reading for each cell, m.
     """
-    size, count, half = len(edges), len(row), cell * math.sqrt(0.5)
+    seen, edges, ways, echoes, least = view.seen, view.edges, row[0], row[1], row[2]
+    size, count, half = len(edges), row.shape[1], cell * math.sqrt(0.5)
     # Along the row, the direction turns to the left for dx > 0, and otherwise to the
     # right. ``slope`` grows.
     sense = 1.0 if dx >= 0.0 else -1.0
     slope = begin_y / max(abs(dx), 1e-12)
     slope -= 1e-9 * (1.0 + abs(slope))
-    sector, k = _sector_at(dx, begin_y, edges), 0
+    turn = math.atan2(begin_y, dx) - view.begin
+    turn -= math.tau * math.floor(turn / math.tau)
+    sector, k = np.searchsorted(view.turns, turn, side="right") - 1, 0
     while k < count:
-        next_edge, end = (sector + 1) % size if sense > 0.0 else sector, count
+        next_edge, end = sector, count
+        if sense > 0.0:
+            next_edge = sector + 1 if sector + 1 < size else 0
         cosine, tangent = edges[next_edge, 0], edges[next_edge, 2]
         if sense * cosine > 0.0 and sense * tangent > slope:
             slope = sense * tangent
-            end = _index(math.ceil((dx * tangent - begin_y) / cell), k, count)
-        way, back, reading = views[sector, 0], views[sector, 1], views[sector, 2]
-        while k < end:
-            row[k, 0], row[k, 1], row[k, 2] = way, back, reading
-            k += 1
-        sector = next_edge if sense > 0.0 else (sector - 1) % size
+            end = _index(np.ceil((dx * tangent - begin_y) / cell), k, count)
+        way, back, reading = seen[sector, 0], seen[sector, 1], seen[sector, 2]
+        for n in range(k, end):
+            ways[n], echoes[n], least[n] = way, back, reading
+        k = end
+        if sense > 0.0:
+            sector = next_edge
+        else:
+            sector = sector - 1 if sector > 0 else size - 1
     # The cells whose circles meet an edge.
-    for right in range(size):
-        if abs(dx) > half and (edges[right, 0] > 0.0) != (dx > 0.0):
+    for k in range(size):
+        cosine, sine, tangent, cotangent, wide, both, reading = edges[k]
+        if abs(dx) > half and (cosine > 0.0) != (dx > 0.0):
             continue
-        middle, wide = dx * edges[right, 2], half / abs(edges[right, 0])
-        low, high, behind = middle - wide, middle + wide, -dx * edges[right, 3]
-        if edges[right, 1] > 0.0:
+        middle, behind = dx * tangent, -dx * cotangent
+        low, high = middle - wide, middle + wide
+        if sine > 0.0:
             low = max(low, behind)
         else:
             high = min(high, behind)
-        k = _index(math.floor((low - begin_y) / cell) + 1.0, 0, count)
-        end = _index(math.ceil((high - begin_y) / cell), 0, count)
-        other = right - 1 if right > 0 else size - 1
-        both = min(views[right, 0], views[other, 0])
-        reading = min(views[right, 2], views[other, 2])
-        while k < end:
-            row[k, 0], row[k, 2] = min(row[k, 0], both), min(row[k, 2], reading)
+        begin = _index(np.floor((low - begin_y) / cell) + 1.0, 0, count)
+        end = _index(np.ceil((high - begin_y) / cell), 0, count)
+        for n in range(begin, end):
+            ways[n], least[n] = min(ways[n], both), min(least[n], reading)
             if both == _OUT_OF_VIEW:
-                row[k, 1] = np.inf
-            k += 1
+                echoes[n] = np.inf
 
 
 @register_jitable
 def _index(value: float, low: int, high: int) -> int:
     return int(min(max(value, float(low)), float(high)))
-
-
-@njit(cache=True)
-def _sector_at(dx: float, dy: float, edges: Any) -> int:  # pragma: no cover  (compiled)
-    """Returns the index of the sector that contains the direction (dx, dy)."""
-    found, least = 0, 4.0
-    for k in range(len(edges)):
-        # Angle from the right edge of the sector, in quarters of a turn.
-        cosine, sine = edges[k, 0], edges[k, 1]
-        ahead, aside = cosine * dx + sine * dy, cosine * dy - sine * dx
-        angle = aside / (abs(ahead) + abs(aside))
-        if ahead < 0.0:
-            angle = 2.0 - angle
-        elif aside < 0.0:
-            angle += 4.0
-        if angle < least:
-            found, least = k, angle
-    return found
 
 
 @njit(cache=True)
