@@ -49,13 +49,13 @@ class FreeSpace(NamedTuple):
     """(2,) i and j of the first cell of the window."""
     rolled_m: NDArray[np.float64]
     """(1,) rolled distance, m."""
-    arcs: NDArray[np.float64]
-    """(sensors, points, 2) arc of points (x, y) at which the view of each sensor ends,
-    m. The arc follows from the last reading of the sensor. Its points go from the right
-    to the left edge of the aperture.
+    ends: NDArray[np.float64]
+    """(sensors, 6) the end of the view of each sensor, which is an arc, after its last
+    reading: position (x, y) of the sensor, m, direction of its axis, rad, half of the
+    aperture, rad, radius of the arc, m, and time of the reading, s, or ``NEVER``.
     """
-    arcs_s: NDArray[np.float64]
-    """(sensors, 1) time of the last reading of each sensor, s, or ``NEVER``."""
+    arc_points: int
+    """Number of points by which the guard replaces an arc."""
     cell_m: float
     """Side of a cell, m."""
 
@@ -81,8 +81,8 @@ def make_free_space(
         np.full((cells, cells), np.inf),
         np.full(2, -(cells // 2)),
         np.zeros(1),
-        np.zeros((sensors, arc_points, 2)),
-        np.full((sensors, 1), NEVER),
+        np.tile((0.0, 0.0, 0.0, 0.0, 0.0, NEVER), (sensors, 1)),
+        arc_points,
         cell_m,
     )
 
@@ -182,11 +182,12 @@ def clear_disc(
     )
     for i in range(low_i, high_i + 1):
         dx = max(x - i * cell, (i + 1) * cell - x)
+        row, at = space.free_until[i % cells], low_j % cells - 1
         for j in range(low_j, high_j + 1):
+            at = at + 1 if at + 1 < cells else 0
             dy = max(y - j * cell, (j + 1) * cell - y)
             if dx * dx + dy * dy <= radius * radius:
-                at = i % cells, j % cells
-                space.free_until[at] = max(space.free_until[at], until)
+                row[at] = max(row[at], until)
 
 
 @njit(cache=True)
@@ -212,11 +213,12 @@ def clear_outline(
     length = outline.half_length_m - frame.half_cell_m
     width = outline.half_width_m - frame.half_cell_m
     for i in range(low_i, high_i + 1):
+        row, at = space.free_until[i % cells], low_j % cells - 1
         for j in range(low_j, high_j + 1):
+            at = at + 1 if at + 1 < cells else 0
             u, v = in_body((i * cell, j * cell), cell, frame)
             if abs(u) <= length and abs(v) <= width:
-                at = i % cells, j % cells
-                space.free_until[at] = max(space.free_until[at], until)
+                row[at] = max(row[at], until)
 
 
 @njit(cache=True)

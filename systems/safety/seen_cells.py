@@ -74,7 +74,7 @@ def see(
     # Radius of the circle around a cell.
     half = cell * math.sqrt(0.5)
     seen = _of_sectors(sectors, readings)
-    row = np.empty((4, cells))
+    row, distances = np.empty((cells, 4)), np.empty(cells)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
@@ -100,16 +100,17 @@ def see(
                 continue
             for k in range(count):
                 dy = (first + k + 0.5) * cell - sy
-                row[3, k] = math.sqrt(dx * dx + dy * dy)
+                distances[k] = math.sqrt(dx * dx + dy * dy)
             begin_y = (first + 0.5) * cell - sy
-            _look_along_row(dx, begin_y, cell, view, row[:, :count])
+            _look_along_row(dx, begin_y, cell, view, row[:count])
             # The map stores the row in two pieces, because its indices wrap around.
             at = first % cells
-            piece = min(count, cells - at)
-            _enter_row(space, i % cells, at, row[:, :piece], sigma, from_axle, error)
+            piece, turned = min(count, cells - at), i % cells
+            of_row = row[:piece], distances[:piece]
+            _enter_row(space, turned, at, of_row, sigma, from_axle, error)
             if piece < count:
-                rest = row[:, piece:count]
-                _enter_row(space, i % cells, 0, rest, sigma, from_axle, error)
+                of_row = row[piece:count], distances[piece:count]
+                _enter_row(space, turned, 0, of_row, sigma, from_axle, error)
 
 
 @njit(cache=True, error_model="numpy")
@@ -117,21 +118,21 @@ def _enter_row(
     space: FreeSpace,
     i: int,
     first: int,
-    row: Any,
+    of_row: Any,
     sigma: float,
     from_axle: float,
     error: Any,
 ) -> None:  # pragma: no cover  (compiled)
     """Changes the cells of a row of the map; see ``see``.
 
-    ``i`` is the row of the arrays, and ``first`` the first cell in it. ``row`` has what
-    the group has seen toward each cell (see ``_look_along_row``), and the distances of
-    the middles of the cells from the group, m.
+    ``i`` is the row of the arrays, and ``first`` the first cell in it. ``of_row`` has
+    what the group has seen toward each cell (see ``_look_along_row``), and the
+    distances of the middles of the cells from the group, m.
     """
     # Radius of the circle around a cell.
     half = space.cell_m * math.sqrt(0.5)
-    count, rolled_m = row.shape[1], space.rolled_m[0]
-    ways, echoes, least, distances = row[0], row[1], row[2], row[3]
+    (row, distances), rolled_m = of_row, space.rolled_m[0]
+    count = len(row)
     free_until = space.free_until[i, first : first + count]
     hits = space.hits[i, first : first + count]
     evidence = space.evidence[i, first : first + count]
@@ -141,21 +142,21 @@ def _enter_row(
         if distance < 2.0 * half:
             continue
         far = distance + half
-        free = ways[k] >= far
+        free, reading = row[k, 0] >= far, row[k, 1]
         # A reading that is too short leaves cells without evidence as they are.
-        if free or (least[k] > -np.inf and (evidence[k] > 0.0 or least[k] > far)):
+        if free or reading > far or (evidence[k] > 0.0 and reading > -np.inf):
             until = rolled_m + lasting(distance + from_axle, error)
             if not free:
                 if evidence[k] == 0.0:
                     evident_until[k] = np.inf
-                z = (least[k] - far) / sigma
+                z = (reading - far) / sigma
                 evidence[k] = max(evidence[k] + z - 0.5, 0.0)
                 evident_until[k] = until = min(evident_until[k], until)
                 free = evidence[k] >= _EVIDENCE
             if free:
                 free_until[k] = max(free_until[k], until)
                 hits[k], evidence[k] = 0.0, 0.0
-        if not free and abs(distance - echoes[k]) <= half:
+        if not free and abs(distance - row[k, 2]) <= half:
             hits[k] += min(1.0, _FULL_HIT_M / distance)
 
 
@@ -191,12 +192,14 @@ def _of_sectors(
 
 
 class _View(NamedTuple):
-    """View of a group of sensors as n sectors that fill the full circle.
+    """View of a group of sensors as sectors that fill the full circle.
 
     Neighboring sectors have seen different distances. If the group does not see all
-    around, one sector is out of view.
+    around, one sector is out of view. The arrays may have room for more sectors.
     """
 
+    size: int
+    """Number of sectors."""
     seen: NDArray[np.float64]
     """(n, 3) distance seen free, distance of the echo, and reading less all errors but
     noise in each sector, m."""
@@ -206,10 +209,12 @@ class _View(NamedTuple):
     turns: NDArray[np.float64]
     """(n,) angle from there to the right edge of each sector, counterclockwise, rad."""
     edges: NDArray[np.float64]
-    """(n, 7) right edge of each sector: cosine, sine, tangent, and cotangent of its
-    direction in the frame of the odometry; half of the length of the cut through the
-    circles around the cells of a row that meet it, m; and the smaller of the distances
-    seen free and of the readings on both sides, m."""
+    """(7, n) right edge of each sector: cosine, sine, tangent, and cotangent of its
+    direction in the frame of the odometry; half of the length of the part of a row
+    within the radius of a cell's circle from the edge, m; and the smaller of the
+    distances seen free and of the readings on both sides, m."""
+    cuts: NDArray[np.float64]
+    """(3, n) scratch memory for the cells at the edges, see ``_cut_row``."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -222,7 +227,7 @@ def _view_of(
     """
     start, stop = sectors.right[begin, 0], sectors.left[end - 1, 0]
     most, count = end - begin + 1, 0
-    views, turns, edges = np.empty((most, 3)), np.empty(most), np.empty((most, 7))
+    views, turns, edges = np.empty((most, 3)), np.empty(most), np.empty((7, most))
     for k in range(begin, end + 1):
         angle, way, echo, reading = stop, _OUT_OF_VIEW, np.inf, -np.inf
         if k < end:
@@ -237,15 +242,16 @@ def _view_of(
         views[count, 0], views[count, 1], views[count, 2] = way, echo, reading
         cosine = _not_zero(math.cos(heading + angle))
         sine = _not_zero(math.sin(heading + angle))
-        edge = edges[count]
-        edge[0], edge[1], edge[2], edge[3] = cosine, sine, sine / cosine, cosine / sine
-        edge[4], turns[count] = half / abs(cosine), angle - start
+        edges[0, count], edges[1, count] = cosine, sine
+        edges[2, count], edges[3, count] = sine / cosine, cosine / sine
+        edges[4, count], turns[count] = half / abs(cosine), angle - start
         count += 1
     for k in range(count):
         other = k - 1 if k > 0 else count - 1
-        edges[k, 5] = min(views[k, 0], views[other, 0])
-        edges[k, 6] = min(views[k, 2], views[other, 2])
-    return _View(views[:count], heading + start, turns[:count], edges[:count])
+        edges[5, k] = min(views[k, 0], views[other, 0])
+        edges[6, k] = min(views[k, 2], views[other, 2])
+    begin_at, cuts = heading + start, np.empty((3, most))
+    return _View(count, views, begin_at, turns, edges, cuts)
 
 
 @register_jitable
@@ -269,11 +275,12 @@ def _look_along_row(
         begin_y: Position of the middle of the first cell relative to the group, m.
         cell: Side of a cell, m.
         view: What the group has seen.
-        row: (4, m) array whose first three rows the function fills with distance seen
-            free, echo and reading for each cell, m.
+        row: (m, 4) array whose first three columns the function fills with distance
+            seen free, reading, and echo for each cell, m.
     """
-    seen, edges, ways, echoes, least = view.seen, view.edges, row[0], row[1], row[2]
-    size, count, half = len(edges), row.shape[1], cell * math.sqrt(0.5)
+    seen, edges, cuts, count = view.seen, view.edges, view.cuts, len(row)
+    size, half = view.size, cell * math.sqrt(0.5)
+    _cut_row(dx, begin_y, cell, float(count), size, edges, cuts)
     # Along the row, the direction turns to the left for dx > 0, and otherwise to the
     # right. ``slope`` grows.
     sense = 1.0 if dx >= 0.0 else -1.0
@@ -281,18 +288,18 @@ def _look_along_row(
     slope -= 1e-9 * (1.0 + abs(slope))
     turn = math.atan2(begin_y, dx) - view.begin
     turn -= math.tau * math.floor(turn / math.tau)
-    sector, k = np.searchsorted(view.turns, turn, side="right") - 1, 0
+    sector, k = np.searchsorted(view.turns[:size], turn, side="right") - 1, 0
     while k < count:
         next_edge, end = sector, count
         if sense > 0.0:
             next_edge = sector + 1 if sector + 1 < size else 0
-        cosine, tangent = edges[next_edge, 0], edges[next_edge, 2]
+        cosine, tangent = edges[0, next_edge], edges[2, next_edge]
         if sense * cosine > 0.0 and sense * tangent > slope:
             slope = sense * tangent
-            end = _index(np.ceil((dx * tangent - begin_y) / cell), k, count)
-        way, back, reading = seen[sector, 0], seen[sector, 1], seen[sector, 2]
+            end = max(int(cuts[0, next_edge]), k)
+        way, echo, reading = seen[sector, 0], seen[sector, 1], seen[sector, 2]
         for n in range(k, end):
-            ways[n], echoes[n], least[n] = way, back, reading
+            row[n, 0], row[n, 1], row[n, 2], row[n, 3] = way, reading, echo, 0.0
         k = end
         if sense > 0.0:
             sector = next_edge
@@ -300,26 +307,42 @@ def _look_along_row(
             sector = sector - 1 if sector > 0 else size - 1
     # The cells whose circles meet an edge.
     for k in range(size):
-        cosine, sine, tangent, cotangent, wide, both, reading = edges[k]
-        if abs(dx) > half and (cosine > 0.0) != (dx > 0.0):
+        if abs(dx) > half and (edges[0, k] > 0.0) != (dx > 0.0):
             continue
-        middle, behind = dx * tangent, -dx * cotangent
-        low, high = middle - wide, middle + wide
-        if sine > 0.0:
-            low = max(low, behind)
-        else:
-            high = min(high, behind)
-        begin = _index(np.floor((low - begin_y) / cell) + 1.0, 0, count)
-        end = _index(np.ceil((high - begin_y) / cell), 0, count)
-        for n in range(begin, end):
-            ways[n], least[n] = min(ways[n], both), min(least[n], reading)
+        both, reading = edges[5, k], edges[6, k]
+        for n in range(int(cuts[1, k]), int(cuts[2, k])):
+            row[n, 0], row[n, 1] = min(row[n, 0], both), min(row[n, 1], reading)
             if both == _OUT_OF_VIEW:
-                echoes[n] = np.inf
+                row[n, 2] = np.inf
 
 
-@register_jitable
-def _index(value: float, low: int, high: int) -> int:
-    return int(min(max(value, float(low)), float(high)))
+@njit(cache=True, error_model="numpy")
+def _cut_row(
+    dx: float,
+    begin_y: float,
+    cell: float,
+    count: float,
+    size: int,
+    edges: Any,
+    cuts: Any,
+) -> None:  # pragma: no cover  (compiled)
+    """Computes at which cells of a row the edges of the sectors are.
+
+    The results are whole numbers from 0 to ``count``: the first cell whose middle is
+    behind the edge, and the first and the last cell, plus 1, whose circles meet it.
+    This loop has no branches, which the loops over cells would have to wait for.
+    """
+    for k in range(size):
+        middle, behind, wide = dx * edges[2, k], -dx * edges[3, k], edges[4, k]
+        low, high, ahead = middle - wide, middle + wide, edges[1, k] > 0.0
+        low = max(low, behind) if ahead else low
+        high = high if ahead else min(high, behind)
+        first = np.ceil((middle - begin_y) / cell)
+        begin = np.floor((low - begin_y) / cell) + 1.0
+        end = np.ceil((high - begin_y) / cell)
+        cuts[0, k] = min(max(first, 0.0), count)
+        cuts[1, k] = min(max(begin, 0.0), count)
+        cuts[2, k] = min(max(end, 0.0), count)
 
 
 @njit(cache=True)
@@ -348,12 +371,9 @@ def end_view(
     axis, half_angle = direction
     c, s = math.cos(pose[2]), math.sin(pose[2])
     x, y = pose[0] + c * place[0] - s * place[1], pose[1] + s * place[0] + c * place[1]
-    points = space.arcs.shape[1]
-    for k in range(points):
-        angle = pose[2] + axis + half_angle * (2.0 * k / (points - 1) - 1.0)
-        space.arcs[sensor, k, 0] = x + reach * math.cos(angle)
-        space.arcs[sensor, k, 1] = y + reach * math.sin(angle)
-    space.arcs_s[sensor, 0] = time
+    end = space.ends[sensor]
+    end[0], end[1], end[2], end[3] = x, y, pose[2] + axis, half_angle
+    end[4], end[5] = reach, time
 
 
 @njit(cache=True)

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from systems.ranging.parameters import UltrasonicParameters
+from systems.safety.danger import view_arcs
 from systems.safety.free_space import (
     NEVER,
     FreeSpace,
@@ -462,6 +463,6 @@ def test_where_a_view_ends():
         (sensor[0] + 1.7 * math.cos(angle), sensor[1] + 1.7 * math.sin(angle))
         for angle in (0.55, 0.675, 0.8, 0.925, 1.05)
     ]
-    np.testing.assert_allclose(space.arcs[1], expected, atol=1e-12)
-    assert space.arcs_s[1, 0] == 3.0
-    assert space.arcs_s[0, 0] == NEVER
+    np.testing.assert_allclose(view_arcs(space, 2)[1], expected, atol=1e-12)
+    assert space.ends[1, 5] == 3.0
+    assert space.ends[0, 5] == NEVER
