@@ -237,13 +237,14 @@ def disc_is_free(
         True if all these cells count as free.
     """
     cell = space.cell_m
-    for i in range(math.floor((x - radius) / cell), math.ceil((x + radius) / cell)):
+    low_i, high_i = math.floor((x - radius) / cell), math.ceil((x + radius) / cell) - 1
+    low_j, high_j = math.floor((y - radius) / cell), math.ceil((y + radius) / cell) - 1
+    free = _free_cells(space, low_i, low_j, high_i, high_j, space.rolled_m[0])
+    for i in range(low_i, high_i + 1):
         dx = max(i * cell - x, 0.0, x - (i + 1) * cell)
-        for j in range(math.floor((y - radius) / cell), math.ceil((y + radius) / cell)):
+        for j in range(low_j, high_j + 1):
             dy = max(j * cell - y, 0.0, y - (j + 1) * cell)
-            if dx * dx + dy * dy < radius * radius and not cell_is_free(
-                space, i, j, space.rolled_m[0]
-            ):
+            if dx * dx + dy * dy < radius * radius and not free[i - low_i, j - low_j]:
                 return False
     return True
 
