@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 
+from benchmarks.beams import beam_figures
 from benchmarks.hearing import frame_figures
 from benchmarks.memory import memory_growth_mb
 from benchmarks.speed import (
@@ -56,6 +57,7 @@ def main() -> int:
                 ">=",
                 500.0,
             ),
+            *beam_figures(),
             Figure("memory, minute 2 to 10, MB", memory_growth_mb(), "<=", 12.0),
             *frame_figures(),
             *start_figures(),

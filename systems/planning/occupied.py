@@ -46,9 +46,10 @@ def list_occupied(
         space, x - reach, y - reach, x + reach, y + reach
     )
     for i in range(low_i, high_i + 1):
-        row = space.hits[i % cells]
+        row, at = space.hits[i % cells], low_j % cells - 1
         for j in range(low_j, high_j + 1):
-            hits = row[j % cells]
+            at = at + 1 if at + 1 < cells else 0
+            hits = row[at]
             if hits < _LEAST_HITS:
                 continue
             px, py = (i + 0.5) * cell, (j + 0.5) * cell

@@ -161,37 +161,34 @@ def _vectors(points, heard, neighbors, joined, every):
     its neighbors.
     """
     # Find the nearest echo.
-    nearest = -1
+    nearest, least = -1, math.inf
     for k in range(len(points)):
-        if not heard[k]:
-            continue
-        if nearest < 0 or _squared(points[k]) < _squared(points[nearest]):
-            nearest = k
+        if heard[k] and float_of(_squared(points[k])) < least:
+            nearest, least = k, float_of(_squared(points[k]))
     # The empty slice gives the empty list its type in compiled code.
     found = [(0.0 * x, x, y) for x, y in points[:0]]
     if nearest < 0:
         return found
-    # Keep pairs of adjacent sensors whose echoes are close enough to each other.
-    pairs = [
-        (int(pair[0]), int(pair[1]))
-        for pair in neighbors
-        if heard[int(pair[0])]
-        and heard[int(pair[1])]
-        and _close(points[int(pair[0])], points[int(pair[1])])
-    ]
     if every:
+        pairs = [
+            (int(pair[0]), int(pair[1]))
+            for pair in neighbors
+            if _is_pair(points, heard, int(pair[0]), int(pair[1]))
+        ]
         return _all_vectors(points, heard, pairs, found)
     if joined:
         # Join the nearest echo with the neighbor that is nearer to P.
         best, least = -1, math.inf
-        for index in range(len(pairs)):
-            left, right = pairs[index]
-            if nearest in (left, right):
-                other = points[right if left == nearest else left]
-                if float_of(_squared(other)) < least:
-                    best, least = index, float_of(_squared(other))
+        for n in range(len(neighbors)):
+            left, right = int(neighbors[n][0]), int(neighbors[n][1])
+            if nearest not in (left, right):
+                continue
+            other = _squared(points[right if left == nearest else left])
+            if float_of(other) < least and _is_pair(points, heard, left, right):
+                best, least = n, float_of(other)
         if best >= 0:
-            found.append(_pair(points, pairs[best][0], pairs[best][1]))
+            left, right = int(neighbors[best][0]), int(neighbors[best][1])
+            found.append(_pair(points, left, right))
             return found
     x, y = points[nearest]
     found.append((0.0 * x + (1.0 + nearest), x, y))
@@ -204,7 +201,11 @@ def _squared(point):
 
 
 @register_jitable
-def _close(a, b):
+def _is_pair(points, heard, left, right):
+    """Whether two sensors have echoes that are close enough to each other."""
+    if not (heard[left] and heard[right]):
+        return False
+    a, b = points[left], points[right]
     return _squared((b[0] - a[0], b[1] - a[1])) < PAIR_SEPARATION_M**2
 
 

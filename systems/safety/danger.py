@@ -122,11 +122,36 @@ def danger_of(
     i, j = math.floor(x / space.cell_m), math.floor(y / space.cell_m)
     if not cell_is_free(space, i, j, until):
         distance = -np.inf
-    ages = time - space.arcs_s[:, 0]
-    danger = Danger(corners, count, space.cell_m, distance, space.arcs, ages, np.inf)
-    view_distance = np.inf
-    if numbers.obstacle_speed_m_s > 0.0:
+    ages, view_distance = time - space.ends[:, 5], np.inf
+    # Without moving obstacles, the ends of views do not matter.
+    moving = numbers.obstacle_speed_m_s > 0.0
+    arcs = view_arcs(space, len(space.ends) if moving else 0)
+    danger = Danger(corners, count, space.cell_m, distance, arcs, ages, np.inf)
+    if moving:
         view_distance = nearest_view(danger, x, y, 0.0, 0.0)
-    return Danger(
-        corners, count, space.cell_m, distance, space.arcs, ages, view_distance
-    )
+    return Danger(corners, count, space.cell_m, distance, arcs, ages, view_distance)
+
+
+@njit(cache=True)
+def view_arcs(
+    space: FreeSpace, sensors: int
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """Computes points of the arcs at which the views of the first sensors end.
+
+    Args:
+        space: Map of free space.
+        sensors: Number of sensors.
+
+    Returns:
+        (sensors, points, 2) points (x, y), from the right to the left edge of the
+        aperture, m.
+    """
+    points = space.arc_points
+    arcs = np.empty((sensors, points, 2))
+    for sensor in range(sensors):
+        x, y, axis, half_angle, reach, _ = space.ends[sensor]
+        for k in range(points):
+            angle = axis + half_angle * (2.0 * k / (points - 1) - 1.0)
+            arcs[sensor, k, 0] = x + reach * math.cos(angle)
+            arcs[sensor, k, 1] = y + reach * math.sin(angle)
+    return arcs

@@ -35,8 +35,6 @@ class FreeSpace(NamedTuple):
     the position of the cell is too uncertain. The value is ``NEVER`` if the cell was
     not seen free.
     """
-    seen_s: NDArray[np.float64]
-    """(n, n) time at which a cell was last seen free, s, or ``NEVER``."""
     hits: NDArray[np.float64]
     """(n, n) weighted number of echoes from each cell since the cell was last seen
     free.
@@ -51,13 +49,13 @@ class FreeSpace(NamedTuple):
     """(2,) i and j of the first cell of the window."""
     rolled_m: NDArray[np.float64]
     """(1,) rolled distance, m."""
-    arcs: NDArray[np.float64]
-    """(sensors, points, 2) arc of points (x, y) at which the view of each sensor ends,
-    m. The arc follows from the last reading of the sensor. Its points go from the right
-    to the left edge of the aperture.
+    ends: NDArray[np.float64]
+    """(sensors, 6) the end of the view of each sensor, which is an arc, after its last
+    reading: position (x, y) of the sensor, m, direction of its axis, rad, half of the
+    aperture, rad, radius of the arc, m, and time of the reading, s, or ``NEVER``.
     """
-    arcs_s: NDArray[np.float64]
-    """(sensors, 1) time of the last reading of each sensor, s, or ``NEVER``."""
+    arc_points: int
+    """Number of points by which the guard replaces an arc."""
     cell_m: float
     """Side of a cell, m."""
 
@@ -78,14 +76,13 @@ def make_free_space(
     """
     return FreeSpace(
         np.full((cells, cells), NEVER),
-        np.full((cells, cells), NEVER),
         np.zeros((cells, cells)),
         np.zeros((cells, cells)),
         np.full((cells, cells), np.inf),
         np.full(2, -(cells // 2)),
         np.zeros(1),
-        np.zeros((sensors, arc_points, 2)),
-        np.full((sensors, 1), NEVER),
+        np.tile((0.0, 0.0, 0.0, 0.0, 0.0, NEVER), (sensors, 1)),
+        arc_points,
         cell_m,
     )
 
@@ -160,7 +157,6 @@ def move_window(
             for other in range(cells):
                 i, j = (k % cells, other) if axis == 0 else (other, k % cells)
                 space.free_until[i, j] = NEVER
-                space.seen_s[i, j] = NEVER
                 space.hits[i, j] = 0.0
                 space.evidence[i, j] = 0.0
         space.first[axis] = wanted
@@ -186,11 +182,12 @@ def clear_disc(
     )
     for i in range(low_i, high_i + 1):
         dx = max(x - i * cell, (i + 1) * cell - x)
+        row, at = space.free_until[i % cells], low_j % cells - 1
         for j in range(low_j, high_j + 1):
+            at = at + 1 if at + 1 < cells else 0
             dy = max(y - j * cell, (j + 1) * cell - y)
             if dx * dx + dy * dy <= radius * radius:
-                at = i % cells, j % cells
-                space.free_until[at] = max(space.free_until[at], until)
+                row[at] = max(row[at], until)
 
 
 @njit(cache=True)
@@ -216,11 +213,12 @@ def clear_outline(
     length = outline.half_length_m - frame.half_cell_m
     width = outline.half_width_m - frame.half_cell_m
     for i in range(low_i, high_i + 1):
+        row, at = space.free_until[i % cells], low_j % cells - 1
         for j in range(low_j, high_j + 1):
+            at = at + 1 if at + 1 < cells else 0
             u, v = in_body((i * cell, j * cell), cell, frame)
             if abs(u) <= length and abs(v) <= width:
-                at = i % cells, j % cells
-                space.free_until[at] = max(space.free_until[at], until)
+                row[at] = max(row[at], until)
 
 
 @njit(cache=True)
@@ -239,13 +237,14 @@ def disc_is_free(
         True if all these cells count as free.
     """
     cell = space.cell_m
-    for i in range(math.floor((x - radius) / cell), math.ceil((x + radius) / cell)):
+    low_i, high_i = math.floor((x - radius) / cell), math.ceil((x + radius) / cell) - 1
+    low_j, high_j = math.floor((y - radius) / cell), math.ceil((y + radius) / cell) - 1
+    free = _free_cells(space, low_i, low_j, high_i, high_j, space.rolled_m[0])
+    for i in range(low_i, high_i + 1):
         dx = max(i * cell - x, 0.0, x - (i + 1) * cell)
-        for j in range(math.floor((y - radius) / cell), math.ceil((y + radius) / cell)):
+        for j in range(low_j, high_j + 1):
             dy = max(j * cell - y, 0.0, y - (j + 1) * cell)
-            if dx * dx + dy * dy < radius * radius and not cell_is_free(
-                space, i, j, space.rolled_m[0]
-            ):
+            if dx * dx + dy * dy < radius * radius and not free[i - low_i, j - low_j]:
                 return False
     return True
 

@@ -135,7 +135,7 @@ def map_step(
         end_view(space, k, time, pose, place, direction, readings[k, 0])
     # Each reading of a sensor updates different rows.
     turn_of_rows = tick // numbers.round_ticks
-    see(space, time, turn_of_rows, pose, numbers.sectors, readings, error)
+    see(space, turn_of_rows, pose, numbers.sectors, readings, error)
 
 
 @register_jitable

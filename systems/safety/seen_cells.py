@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.safety.free_space import FreeSpace, cells_within
+from systems.safety.group_view import group_view, look_along_row, seen_in_sectors
 from systems.safety.views import Sectors, lasting
 
 register_jitable(lasting)
@@ -22,25 +22,14 @@ _ROWS = 4
 #: inequality, noise alone does this with a probability of at most 2.9e-7, which is the
 #: probability that normally distributed noise exceeds 5 standard deviations.
 _EVIDENCE = 15.06
-#: A reading changes the evidence of cells up to this distance behind it, in standard
-#: deviations. Farther behind, it would only decrease the evidence.
-_BEHIND = 5.0
 #: Echoes within this distance count as a full hit, m. Farther echoes count less,
 #: because their arcs are longer.
 _FULL_HIT_M = 0.6
-#: Distance seen free in a sector beyond the edges of the view of a group.
-_OUT_OF_VIEW = -1.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def see(
-    space: FreeSpace,
-    time: float,
-    turn: int,
-    pose: Any,
-    sectors: Sectors,
-    readings: Any,
-    error: Any,
+    space: FreeSpace, turn: int, pose: Any, sectors: Sectors, readings: Any, error: Any
 ) -> None:  # pragma: no cover  (compiled)
     """Enters the newest readings of the sensors into the map of free space.
 
@@ -65,7 +54,6 @@ def see(
 
     Args:
         space: Map of free space. The function changes the map in place.
-        time: Current time, s.
         turn: Number of the call. One call updates only every fourth row of cells. The
             next call updates other rows.
         pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
@@ -80,8 +68,8 @@ def see(
     cell, cells = space.cell_m, space.free_until.shape[0]
     # Radius of the circle around a cell.
     half = cell * math.sqrt(0.5)
-    seen = _of_sectors(sectors, readings)
-    row = np.empty((cells, 3))
+    seen = seen_in_sectors(sectors, readings)
+    row, distances = np.empty((cells, 4)), np.empty(cells)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
@@ -95,7 +83,7 @@ def see(
             sx, sy, pose[2] + right, pose[2] + left, farthest + cell
         )
         low_i, low_j, high_i, high_j = cells_within(space, low_x, low_y, high_x, high_y)
-        edges, views = _view_of(sectors, seen, begin, end, pose[2])
+        view = group_view(sectors, seen, begin, end, pose[2], half)
         sigma = np.max(seen[begin:end, 4])
         for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
             dx = (i + 0.5) * cell - sx
@@ -105,195 +93,66 @@ def see(
             count = min(high_j, math.floor((sy + reach) / cell)) - first + 1
             if count <= 0:
                 continue
-            begin_y = (first + 0.5) * cell - sy
-            _look_along_row(dx, begin_y, cell, edges, views, row[:count])
-            at_i, at_j = i % cells, first % cells - 1
             for k in range(count):
-                at_j = at_j + 1 if at_j + 1 < cells else 0
                 dy = (first + k + 0.5) * cell - sy
-                squared = dx * dx + dy * dy
-                if squared < 4.0 * half * half:
-                    continue
-                distance = math.sqrt(squared)
-                free, far = row[k, 0] >= distance + half, distance + half
-                at = at_i, at_j
-                if free or row[k, 2] > -np.inf:
-                    until = space.rolled_m[0] + lasting(distance + from_axle, error)
-                    if not free:
-                        until = _weigh(space, at, (row[k, 2] - far) / sigma, until)
-                        free = space.evidence[at] >= _EVIDENCE
-                    if free:
-                        space.free_until[at] = max(space.free_until[at], until)
-                        space.seen_s[at] = time
-                        space.hits[at], space.evidence[at] = 0.0, 0.0
-                if not free and abs(distance - row[k, 1]) <= half:
-                    space.hits[at] += min(1.0, _FULL_HIT_M / distance)
-
-
-@register_jitable
-def _weigh(space: FreeSpace, at: Any, z: float, until: float) -> float:
-    """Adds a reading to the evidence of a cell.
-
-    The reading is valid until the rolled distance ``until``, m. The function returns
-    the distance until which all readings in the evidence are valid, m.
-    """
-    if space.evidence[at] == 0.0:
-        space.evident_until[at] = np.inf
-    space.evidence[at] = max(space.evidence[at] + z - 0.5, 0.0)
-    space.evident_until[at] = min(space.evident_until[at], until)
-    return space.evident_until[at]
-
-
-@njit(cache=True)
-def _of_sectors(
-    sectors: Sectors, readings: Any
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Combines the readings of the sensors that see each sector.
-
-    Returns:
-        (sectors, 5) five distances per sector, m: the distance seen free; the distance
-        of the nearest echo, infinite without an echo; the distance up to which cells
-        can change; and the reading and the noise of the first sensor, minus infinity
-        and 1 without a new reading or without noise.
-    """
-    seen = np.empty((len(sectors.right), 5))
-    for k in range(len(seen)):
-        free, echo, first = 0.0, np.inf, True
-        seen[k, 3], seen[k, 4] = -np.inf, 1.0
-        for sensor in range(len(readings)):
-            if sectors.seen_by[k, sensor]:
-                if first and readings[sensor, 3] > 0.0:
-                    seen[k, 3], seen[k, 4] = readings[sensor, 2], readings[sensor, 3]
-                first = False
-                free = max(free, readings[sensor, 0])
-                echo = min(echo, readings[sensor, 1])
-        seen[k, 0], seen[k, 1] = free, echo
-        # Cells behind the echo also lose evidence.
-        behind = echo + _BEHIND * seen[k, 4] if seen[k, 3] > -np.inf else echo
-        seen[k, 2] = max(free, behind) if echo < np.inf else free
-    return seen
-
-
-@njit(cache=True)
-def _view_of(
-    sectors: Sectors, seen: Any, begin: int, end: int, heading: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Returns the view of a group of sensors as sectors that fill the full circle.
-
-    Returns:
-        (n, 4) cosine, sine, tangent, and cotangent of the direction of the right edge
-        of each sector in the frame of the odometry, from right to left; and (n, 3)
-        distance seen free, distance of the echo, and reading less all errors but noise
-        in each sector, m. If the group does not see all around, the last sector is out
-        of view.
-    """
-    count = end - begin
-    around = sectors.left[end - 1, 0] - sectors.right[begin, 0] > math.tau - 1e-9
-    size = count if around else count + 1
-    edges, views = np.empty((size, 4)), np.empty((size, 3))
-    for k in range(size):
-        angle = sectors.right[begin + k, 0] if k < count else sectors.left[end - 1, 0]
-        cosine = _not_zero(math.cos(heading + angle))
-        sine = _not_zero(math.sin(heading + angle))
-        edges[k, 0], edges[k, 1] = cosine, sine
-        edges[k, 2], edges[k, 3] = sine / cosine, cosine / sine
-        views[k, 0] = seen[begin + k, 0] if k < count else _OUT_OF_VIEW
-        views[k, 1] = seen[begin + k, 1] if k < count else np.inf
-        views[k, 2] = seen[begin + k, 3] if k < count else -np.inf
-    return edges, views
-
-
-@register_jitable
-def _not_zero(value: float) -> float:
-    return math.copysign(max(abs(value), 1e-12), value)
+                distances[k] = math.sqrt(dx * dx + dy * dy)
+            begin_y = (first + 0.5) * cell - sy
+            look_along_row(dx, begin_y, cell, view, row[:count])
+            # The map stores the row in two pieces, because its indices wrap around.
+            at = first % cells
+            piece, turned = min(count, cells - at), i % cells
+            of_row = row[:piece], distances[:piece]
+            _enter_row(space, turned, at, of_row, sigma, from_axle, error)
+            if piece < count:
+                of_row = row[piece:count], distances[piece:count]
+                _enter_row(space, turned, 0, of_row, sigma, from_axle, error)
 
 
 @njit(cache=True, error_model="numpy")
-def _look_along_row(
-    dx: float,
-    begin_y: float,
-    cell: float,
-    edges: Any,
-    views: Any,
-    row: Any,
+def _enter_row(
+    space: FreeSpace,
+    i: int,
+    first: int,
+    of_row: Any,
+    sigma: float,
+    from_axle: float,
+    error: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Computes how far a group of sensors has seen toward the cells of a row.
+    """Changes the cells of a row of the map; see ``see``.
 
-    The distance seen free toward a cell, and the reading, are the least of all sectors
-    that overlap the circle around the cell. The echo is that of the sector that
-    contains the middle of the cell. There is no echo and no reading if a part of the
-    circle is out of view.
-
-    Args:
-        dx: Position of the row relative to the group, m.
-        begin_y: Position of the middle of the first cell relative to the group, m.
-        cell: Side of a cell, m.
-        edges: (n, 4) edges of the sectors, see ``_view_of``.
-        views: (n, 3) what each sector has seen, see ``_view_of``.
-        row: (m, 3) array that the function fills with distance seen free, echo and
-            reading for each cell, m.
+    ``i`` is the row of the arrays, and ``first`` the first cell in it. ``of_row`` has
+    what the group has seen toward each cell (see ``look_along_row``), and the
+    distances of the middles of the cells from the group, m.
     """
-    size, count, half = len(edges), len(row), cell * math.sqrt(0.5)
-    # Along the row, the direction turns to the left for dx > 0, and otherwise to the
-    # right. ``slope`` grows.
-    sense = 1.0 if dx >= 0.0 else -1.0
-    slope = begin_y / max(abs(dx), 1e-12)
-    slope -= 1e-9 * (1.0 + abs(slope))
-    sector, k = _sector_at(dx, begin_y, edges), 0
-    while k < count:
-        next_edge, end = (sector + 1) % size if sense > 0.0 else sector, count
-        cosine, tangent = edges[next_edge, 0], edges[next_edge, 2]
-        if sense * cosine > 0.0 and sense * tangent > slope:
-            slope = sense * tangent
-            end = _index(math.ceil((dx * tangent - begin_y) / cell), k, count)
-        way, back, reading = views[sector, 0], views[sector, 1], views[sector, 2]
-        while k < end:
-            row[k, 0], row[k, 1], row[k, 2] = way, back, reading
-            k += 1
-        sector = next_edge if sense > 0.0 else (sector - 1) % size
-    # The cells whose circles meet an edge.
-    for right in range(size):
-        if abs(dx) > half and (edges[right, 0] > 0.0) != (dx > 0.0):
+    # Radius of the circle around a cell.
+    half = space.cell_m * math.sqrt(0.5)
+    (row, distances), rolled_m = of_row, space.rolled_m[0]
+    count = len(row)
+    free_until = space.free_until[i, first : first + count]
+    hits = space.hits[i, first : first + count]
+    evidence = space.evidence[i, first : first + count]
+    evident_until = space.evident_until[i, first : first + count]
+    for k in range(count):
+        distance = distances[k]
+        if distance < 2.0 * half:
             continue
-        middle, wide = dx * edges[right, 2], half / abs(edges[right, 0])
-        low, high, behind = middle - wide, middle + wide, -dx * edges[right, 3]
-        if edges[right, 1] > 0.0:
-            low = max(low, behind)
-        else:
-            high = min(high, behind)
-        k = _index(math.floor((low - begin_y) / cell) + 1.0, 0, count)
-        end = _index(math.ceil((high - begin_y) / cell), 0, count)
-        other = right - 1 if right > 0 else size - 1
-        both = min(views[right, 0], views[other, 0])
-        reading = min(views[right, 2], views[other, 2])
-        while k < end:
-            row[k, 0], row[k, 2] = min(row[k, 0], both), min(row[k, 2], reading)
-            if both == _OUT_OF_VIEW:
-                row[k, 1] = np.inf
-            k += 1
-
-
-@register_jitable
-def _index(value: float, low: int, high: int) -> int:
-    return int(min(max(value, float(low)), float(high)))
-
-
-@njit(cache=True)
-def _sector_at(dx: float, dy: float, edges: Any) -> int:  # pragma: no cover  (compiled)
-    """Returns the index of the sector that contains the direction (dx, dy)."""
-    found, least = 0, 4.0
-    for k in range(len(edges)):
-        # Angle from the right edge of the sector, in quarters of a turn.
-        cosine, sine = edges[k, 0], edges[k, 1]
-        ahead, aside = cosine * dx + sine * dy, cosine * dy - sine * dx
-        angle = aside / (abs(ahead) + abs(aside))
-        if ahead < 0.0:
-            angle = 2.0 - angle
-        elif aside < 0.0:
-            angle += 4.0
-        if angle < least:
-            found, least = k, angle
-    return found
+        far = distance + half
+        free, reading = row[k, 0] >= far, row[k, 1]
+        # A reading that is too short leaves cells without evidence as they are.
+        if free or reading > far or (evidence[k] > 0.0 and reading > -np.inf):
+            until = rolled_m + lasting(distance + from_axle, error)
+            if not free:
+                if evidence[k] == 0.0:
+                    evident_until[k] = np.inf
+                z = (reading - far) / sigma
+                evidence[k] = max(evidence[k] + z - 0.5, 0.0)
+                evident_until[k] = until = min(evident_until[k], until)
+                free = evidence[k] >= _EVIDENCE
+            if free:
+                free_until[k] = max(free_until[k], until)
+                hits[k], evidence[k] = 0.0, 0.0
+        if not free and abs(distance - row[k, 2]) <= half:
+            hits[k] += min(1.0, _FULL_HIT_M / distance)
 
 
 @njit(cache=True)
@@ -322,12 +181,9 @@ def end_view(
     axis, half_angle = direction
     c, s = math.cos(pose[2]), math.sin(pose[2])
     x, y = pose[0] + c * place[0] - s * place[1], pose[1] + s * place[0] + c * place[1]
-    points = space.arcs.shape[1]
-    for k in range(points):
-        angle = pose[2] + axis + half_angle * (2.0 * k / (points - 1) - 1.0)
-        space.arcs[sensor, k, 0] = x + reach * math.cos(angle)
-        space.arcs[sensor, k, 1] = y + reach * math.sin(angle)
-    space.arcs_s[sensor, 0] = time
+    end = space.ends[sensor]
+    end[0], end[1], end[2], end[3] = x, y, pose[2] + axis, half_angle
+    end[4], end[5] = reach, time
 
 
 @njit(cache=True)

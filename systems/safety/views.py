@@ -48,6 +48,8 @@ class Sectors(NamedTuple):
     """(sectors, 1) direction in B at which a sector ends, rad."""
     seen_by: NDArray[np.bool_]
     """(sectors, sensors) whether a sensor sees a sector."""
+    pairs: NDArray[np.int64]
+    """(pairs, 2) sector and sensor, for each sensor that sees a sector, by sector."""
 
 
 class PlaceError(NamedTuple):
@@ -125,9 +127,10 @@ def lasting(distance: float, error: PlaceError) -> float:
         grow, and minus infinity if the error is too large from the start.
     """
     e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
-    a = 2.0 * e / separation
-    b = e + a * distance + pulse / separation
-    left = error.allowed_m - pulse * (1.0 + distance / separation)
+    # The map computes this for many cells, and divides only by what differs.
+    a, per_meter = 2.0 * e / separation, pulse / separation
+    b = e + a * distance + per_meter
+    left = error.allowed_m - pulse - per_meter * distance
     if left < 0.0:
         return -np.inf
     if b == 0.0:
@@ -168,7 +171,8 @@ def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sec
         first.append(len(right))
     ahead = np.array([[control_point_m + x, y] for x, y in places])
     columns = np.reshape(right, (-1, 1)), np.reshape(left, (-1, 1))
-    return Sectors(ahead, np.array(first), *columns, np.array(seen_by))
+    pairs = np.argwhere(seen_by)
+    return Sectors(ahead, np.array(first), *columns, np.array(seen_by), pairs)
 
 
 def _between(

@@ -13,32 +13,23 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
-from systems.world.geometry import beyond, corners_of
+from systems.world.geometry import beyond, fill_corners
 
 #: Margin of lengths, m, and of angles, rad, that exceeds all rounding errors.
 _MARGIN = 1e-6
+#: Ratio of squared distances that exceeds all rounding errors.
+_FARTHER = 1.0 + 1e-9
 
 
-@njit(cache=True)
-def _nearest_on_segment(
-    ax: float, ay: float, bx: float, by: float
-) -> float:  # pragma: no cover  (compiled)
-    """Returns the distance from the origin to the segment a-b."""
-    ex, ey = bx - ax, by - ay
-    squared = ex * ex + ey * ey
-    t = 0.0 if squared == 0.0 else -(ax * ex + ay * ey) / squared
-    t = min(1.0, max(0.0, t))
-    return math.hypot(ax + t * ex, ay + t * ey)
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _range_to_segment(
-    ax: float, ay: float, bx: float, by: float, slope: float
+    ax: float, ay: float, bx: float, by: float, slope: float, best: float
 ) -> float:  # pragma: no cover  (compiled)
     """Returns the distance from the origin to the part of a segment inside a cone.
 
     The axis of the cone is the x axis, and ``slope`` is the tangent of half of the
-    opening angle. The distance is infinite if no part is inside the cone.
+    opening angle. The result is ``best`` if no part is inside the cone, or if the
+    distance is larger than ``best``.
     """
     # The part of the segment from low to high is between both sides of the cone.
     low, high = 0.0, 1.0
@@ -46,17 +37,25 @@ def _range_to_segment(
         ga = slope * ax - side * ay
         gb = slope * bx - side * by
         if ga < 0.0 and gb < 0.0:
-            low, high = 1.0, 0.0
-        elif ga < 0.0:
+            return best
+        if ga < 0.0:
             low = max(low, ga / (ga - gb))
         elif gb < 0.0:
             high = min(high, ga / (ga - gb))
     if low > high:
-        return np.inf
+        return best
     ex, ey = bx - ax, by - ay
-    return _nearest_on_segment(
-        ax + low * ex, ay + low * ey, ax + high * ex, ay + high * ey
-    )
+    ax, ay, bx, by = ax + low * ex, ay + low * ey, ax + high * ex, ay + high * ey
+    # The point of this part that is nearest to the origin.
+    ex, ey = bx - ax, by - ay
+    squared = ex * ex + ey * ey
+    t = 0.0 if squared == 0.0 else -(ax * ex + ay * ey) / squared
+    t = min(1.0, max(0.0, t))
+    x, y = ax + t * ex, ay + t * ey
+    # ``hypot`` takes long, and most parts are behind others.
+    if x * x + y * y > _FARTHER * best * best:
+        return best
+    return min(best, math.hypot(x, y))
 
 
 @njit(cache=True)
@@ -104,34 +103,37 @@ def _range_to_rectangle(
     sine: float,
     slope: float,
     half_angle: float,
+    best: float,
 ) -> float:  # pragma: no cover  (compiled)
     """Returns the distance from a sensor to the outline of a rectangle in its cone.
 
     ``corners`` are relative to the sensor. ``cosine`` and ``sine`` give the direction
-    of the axis of the cone.
+    of the axis of the cone. The result is ``best`` if it is smaller.
     """
-    best = np.inf
     length, width, radius = rectangle[3], rectangle[4], rectangle[5]
     # A line segment has one edge.
     edges = 4
     if radius == 0.0 and (length == 0.0 or width == 0.0):
         edges = 2 if length == 0.0 else 1
+    dx, dy = corners[0, 0], corners[0, 1]
+    bx, by = cosine * dx + sine * dy, -sine * dx + cosine * dy
     for i in range(edges):
         j = (i + 1) % 4
-        dx, dy = corners[i, 0], corners[i, 1]
-        fx, fy = corners[j, 0], corners[j, 1]
-        ax, ay = cosine * dx + sine * dy, -sine * dx + cosine * dy
-        bx, by = cosine * fx + sine * fy, -sine * fx + cosine * fy
-        if radius > 0.0:
-            along = length if i % 2 == 0 else width
-            if along > 0.0 or i == 0:
-                best = min(best, _range_to_disc(ax, ay, radius, half_angle))
-            if along == 0.0:
-                continue
+        dx, dy = corners[j, 0], corners[j, 1]
+        ax, ay = bx, by
+        bx, by = cosine * dx + sine * dy, -sine * dx + cosine * dy
+        if radius == 0.0:
+            best = _range_to_segment(ax, ay, bx, by, slope, best)
+            continue
+        along = length if i % 2 == 0 else width
+        if along > 0.0 or i == 0:
+            best = min(best, _range_to_disc(ax, ay, radius, half_angle))
+        if along > 0.0:
             # Move the edge to the right of its direction, which is outward.
             out_x, out_y = radius * (by - ay) / along, radius * (ax - bx) / along
-            ax, ay, bx, by = ax + out_x, ay + out_y, bx + out_x, by + out_y
-        best = min(best, _range_to_segment(ax, ay, bx, by, slope))
+            best = _range_to_segment(
+                ax + out_x, ay + out_y, bx + out_x, by + out_y, slope, best
+            )
     return best
 
 
@@ -157,15 +159,14 @@ def _is_inside(
 
 
 @register_jitable
-def _corners_from(
-    rectangle: NDArray[np.float64], x: float, y: float
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Returns the (4, 2) corners of a rectangle relative to a sensor at (x, y), m."""
-    corners = corners_of(rectangle)
+def _fill_corners_from(
+    corners: NDArray[np.float64], rectangle: NDArray[np.float64], x: float, y: float
+) -> None:  # pragma: no cover  (compiled)
+    """Fills ``corners`` (4, 2) with those of a rectangle from a sensor at (x, y), m."""
+    fill_corners(corners, rectangle)
     for i in range(4):
         corners[i, 0] -= x
         corners[i, 1] -= y
-    return corners
 
 
 @njit(cache=True)
@@ -194,18 +195,19 @@ def cone_range(
     """
     best = np.inf
     cosine, sine = math.cos(axis), math.sin(axis)
-    slope = math.tan(half_angle)
+    slope, corners = math.tan(half_angle), np.empty((4, 2))
     for k in range(rectangles.shape[0]):
         rectangle = rectangles[k]
-        corners = _corners_from(rectangle, x, y)
+        _fill_corners_from(corners, rectangle, x, y)
         if _is_inside(corners, rectangle, x, y):
             return 0.0
-        found = _range_to_rectangle(corners, rectangle, cosine, sine, slope, half_angle)
-        best = min(best, found)
+        best = _range_to_rectangle(
+            corners, rectangle, cosine, sine, slope, half_angle, best
+        )
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fan_ranges(
     pose_WB: NDArray[np.float64],
     rectangles: NDArray[np.float64],
@@ -242,7 +244,7 @@ def fan_ranges(
     ranges, cosines, sines = np.full(count, np.inf), np.empty(count), np.empty(count)
     for k in range(count):
         cosines[k], sines[k] = math.cos(theta + axes[k]), math.sin(theta + axes[k])
-    begin = 0
+    begin, corners = 0, np.empty((4, 2))
     while begin < count:
         end = _fan_end(begin, axes, places, half_angles)
         ahead, left = control_point_m + places[begin, 0], places[begin, 1]
@@ -258,7 +260,7 @@ def fan_ranges(
             squared, far = dx * dx + dy * dy, reach_m + outer
             if squared <= far * far:
                 circle = math.atan2(dy, dx), math.sqrt(squared), outer
-                _see_rectangle(ranges, at, fan, cone, rectangles[k], circle)
+                _see_rectangle(ranges, at, fan, cone, rectangles[k], circle, corners)
         begin = end
     return ranges
 
@@ -292,26 +294,35 @@ def _see_rectangle(
     cone: tuple[float, float],
     rectangle: NDArray[np.float64],
     circle: tuple[float, float, float],
+    corners: NDArray[np.float64],
 ) -> None:
     """Reduces the ranges of the sensors of a fan at ``at`` that see a rectangle.
 
     ``cone`` has the tangent of half of the opening angle, and this half angle, rad.
     ``circle`` is the circle around the rectangle: direction of its center in W, rad,
-    distance of its center from the fan, m, and radius, m.
+    distance of its center from the fan, m, and radius, m. ``corners`` (4, 2) is scratch
+    memory.
     """
     begin, end, axes, theta, cosines, sines = fan
     slope, half_angle = cone
     bearing, distance, outer = circle
-    corners = _corners_from(rectangle, at[0], at[1])
+    _fill_corners_from(corners, rectangle, at[0], at[1])
     if distance <= outer:
         inside = _is_inside(corners, rectangle, at[0], at[1])
         for k in range(begin, end):
-            found = 0.0
-            if not inside:
-                found = _range_to_rectangle(
-                    corners, rectangle, cosines[k], sines[k], slope, half_angle
+            ranges[k] = (
+                0.0
+                if inside
+                else _range_to_rectangle(
+                    corners,
+                    rectangle,
+                    cosines[k],
+                    sines[k],
+                    slope,
+                    half_angle,
+                    ranges[k],
                 )
-            ranges[k] = min(ranges[k], found)
+            )
         return
     # Angles relative to the middle of the fan, growing from the first to the last
     # sensor. The middle of the rectangle is at ``off``, from -pi to pi.
@@ -319,7 +330,9 @@ def _see_rectangle(
     sense = -1.0 if way < 0.0 else 1.0
     off = sense * (bearing - theta - middle)
     off -= math.tau * math.floor(off / math.tau + 0.5)
-    half = math.asin(outer / distance) + half_angle + _MARGIN
+    # An upper bound of asin(share), which costs less than the exact value.
+    share = outer / distance
+    half = share + (math.pi / 2.0 - 1.0) * share**3 + half_angle + _MARGIN
     pitch = max(abs(way) / max(end - begin - 1, 1), 1e-6)
     for turn in (-math.tau, 0.0, math.tau):
         low, high = off + turn - half, off + turn + half
@@ -333,8 +346,13 @@ def _see_rectangle(
             k += 1
         while k < end and sense * (axes[k] - middle) <= high:
             if ranges[k] > distance - outer:
-                found = _range_to_rectangle(
-                    corners, rectangle, cosines[k], sines[k], slope, half_angle
+                ranges[k] = _range_to_rectangle(
+                    corners,
+                    rectangle,
+                    cosines[k],
+                    sines[k],
+                    slope,
+                    half_angle,
+                    ranges[k],
                 )
-                ranges[k] = min(ranges[k], found)
             k += 1

@@ -123,15 +123,23 @@ def corners_of(
     Returns:
         (4, 2) corners, counterclockwise from front left, m.
     """
+    corners = np.empty((4, 2))
+    fill_corners(corners, rectangle)
+    return corners
+
+
+@register_jitable
+def fill_corners(
+    corners: NDArray[np.float64], rectangle: NDArray[np.float64]
+) -> None:  # pragma: no cover  (compiled)
+    """Writes what ``corners_of`` returns to ``corners``, without a new array."""
     x, y, theta, length, width, _ = rectangle
     c, s = math.cos(theta), math.sin(theta)
-    corners = np.empty((4, 2))
     for k in range(4):
         u = length / 2.0 if k in (0, 3) else -length / 2.0
         v = width / 2.0 if k in (0, 1) else -width / 2.0
         corners[k, 0] = x + c * u - s * v
         corners[k, 1] = y + s * u + c * v
-    return corners
 
 
 @njit(cache=True)

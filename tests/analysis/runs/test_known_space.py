@@ -37,7 +37,7 @@ def guarded(*overrides):
 
 
 def assert_same(ours, theirs):
-    for name in ("free_until", "seen_s", "hits", "first", "rolled_m", "arcs", "arcs_s"):
+    for name in ("free_until", "hits", "first", "rolled_m", "ends"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), name)
 
 

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from systems.ranging.parameters import UltrasonicParameters
+from systems.safety.danger import view_arcs
 from systems.safety.free_space import (
     NEVER,
     FreeSpace,
@@ -91,7 +92,7 @@ def seen_space(
     readings = exact([[way, np.inf] for way in free])
     sectors = sensor_sectors(sensors, CONTROL_POINT_M)
     for tick in range(4):
-        see(space, 0.0, tick, pose, sectors, readings, EXACT)
+        see(space, tick, pose, sectors, readings, EXACT)
     return space
 
 
@@ -233,10 +234,10 @@ def test_every_fourth_row_at_a_tick():
     whole = make_free_space(160, CELL_M, 3, 17)
     for tick in range(4):
         space = make_free_space(160, CELL_M, 3, 17)
-        see(space, 0.0, tick, pose, sectors, readings, EXACT)
+        see(space, tick, pose, sectors, readings, EXACT)
         cells = free_cells(space)
         assert {(i - tick) % 4 for i, _ in cells} == {0}
-        see(whole, 0.0, tick, pose, sectors, readings, EXACT)
+        see(whole, tick, pose, sectors, readings, EXACT)
         assert free_cells(whole) >= cells
 
 
@@ -247,15 +248,14 @@ def test_an_echo_is_counted_where_it_came_from_until_the_cell_is_seen_free():
     pose = np.zeros(3)
     readings = exact([[0.0, np.inf], [1.18, 1.2], [0.0, np.inf]])
     for tick in range(8):
-        see(space, 0.1 * tick, tick, pose, sectors, readings, EXACT)
+        see(space, tick, pose, sectors, readings, EXACT)
     i = math.floor((CONTROL_POINT_M + 1.2) / CELL_M)
     assert 0.9 < space.hits[i, 0] <= 2.0
     assert not cell_is_free(space, i, 0, 0.0)
     readings[1, :2] = 2.0, np.inf
     for tick in range(4):
-        see(space, 1.0, tick, pose, sectors, readings, EXACT)
+        see(space, tick, pose, sectors, readings, EXACT)
     assert space.hits[i, 0] == 0.0
-    assert space.seen_s[i, 0] == 1.0
     assert cell_is_free(space, i, 0, 1e9)
 
 
@@ -264,7 +264,6 @@ def test_the_window_forgets_what_leaves_it_and_keeps_what_stays(x, y):
     space = make_free_space(64, CELL_M, 1, 2)
     draw = np.random.default_rng(3)
     space.free_until[:] = draw.choice([NEVER, 7.0], size=(64, 64))
-    space.seen_s[:] = space.free_until
     before = free_cells(space)
     move_window(space, x, y)
     i, j = space.first
@@ -273,7 +272,6 @@ def test_the_window_forgets_what_leaves_it_and_keeps_what_stays(x, y):
     assert abs(j + 32 - y / CELL_M) <= 9
     window = {(a, b) for a in range(i, i + 64) for b in range(j, j + 64)}
     assert free_cells(space) == before & window
-    assert (space.seen_s == space.free_until).all()
     assert not cell_is_free(space, i - 1, j, 0.0)
     assert not cell_is_free(space, i, j + 64, 0.0)
 
@@ -295,7 +293,7 @@ def test_several_readings_are_evidence_as_one_of_five_deviations_is(sigmas, look
         if found is None and cell_is_free(space, i, 0, 0.0):
             found = look
         for turn in range(4):
-            see(space, 0.0, turn, pose, sectors, readings, EXACT)
+            see(space, turn, pose, sectors, readings, EXACT)
     assert found == looks
 
 
@@ -310,7 +308,7 @@ def test_noise_alone_is_no_evidence():
         for errors in draw.normal(0.0, noise_m, (5_000, 3)):
             for turn in range(4):
                 readings = noisy(far + errors, noise_m)
-                see(space, 0.0, turn, pose, sectors, readings, EXACT)
+                see(space, turn, pose, sectors, readings, EXACT)
             highest = max(highest, space.evidence[23, 0])
             assert not cell_is_free(space, 23, 0, 0.0)
     # By Ville's inequality, it comes to ln(1/p) once in 1/p readings at most.
@@ -447,7 +445,7 @@ def test_cells_count_as_long_as_their_distance_from_the_axle_allows():
     space.rolled_m[0] = 5.0
     readings = exact([[2.0, np.inf]] * 3)
     for tick in range(4):
-        see(space, 0.0, tick, np.zeros(3), sectors, readings, error)
+        see(space, tick, np.zeros(3), sectors, readings, error)
     for i, j in free_cells(space):
         far = math.hypot((i + 0.5) * CELL_M, (j + 0.5) * CELL_M)
         until = 5.0 + lasting(far, error)
@@ -465,6 +463,6 @@ def test_where_a_view_ends():
         (sensor[0] + 1.7 * math.cos(angle), sensor[1] + 1.7 * math.sin(angle))
         for angle in (0.55, 0.675, 0.8, 0.925, 1.05)
     ]
-    np.testing.assert_allclose(space.arcs[1], expected, atol=1e-12)
-    assert space.arcs_s[1, 0] == 3.0
-    assert space.arcs_s[0, 0] == NEVER
+    np.testing.assert_allclose(view_arcs(space, 2)[1], expected, atol=1e-12)
+    assert space.ends[1, 5] == 3.0
+    assert space.ends[0, 5] == NEVER
