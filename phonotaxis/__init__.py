@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from analysis.loops.diagram_linearization import linearize
     from analysis.loops.given_bursts import burst_cycle
     from analysis.loops.given_delays import delay_margin
-    from analysis.loops.given_loops import disk_margin, loop_at, margins
+    from analysis.loops.given_loops import loop_at
+    from analysis.loops.given_margins import disk_margin, margins
     from analysis.loops.given_oscillations import describing_function
     from analysis.loops.given_robustness import Robustness, robustness
     from analysis.loops.linearized_diagram import LinearizedDiagram
@@ -142,10 +143,10 @@ _HOMES = {
     "delay_margin": "analysis.loops.given_delays",
     "describing_function": "analysis.loops.given_oscillations",
     "burst_cycle": "analysis.loops.given_bursts",
-    "disk_margin": "analysis.loops.given_loops",
+    "disk_margin": "analysis.loops.given_margins",
     "laws": "phonotaxis.listings",
     "loop_at": "analysis.loops.given_loops",
-    "margins": "analysis.loops.given_loops",
+    "margins": "analysis.loops.given_margins",
     "robustness": "analysis.loops.given_robustness",
     "library_scenarios": "diagrams.scenario.loading",
     "linearize": "analysis.loops.diagram_linearization",

@@ -10,7 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.systems.framework import System
 
+from analysis.loops.diagram_linearization import linearize
 from analysis.loops.given_loops import as_linear_model
 from analysis.loops.growth_bound import MOST_PARTS, Family, GrowthBound, bound_growth
 from analysis.loops.stable_scale import StableScale, stable_scale
@@ -102,8 +104,9 @@ def robustness(
 
     Args:
         model_of: Returns the closed loop for parameters by name: an (n, n) matrix A, a
-            ``control.StateSpace`` or ``control.TransferFunction``, or a
-            ``LinearModel``. The number of states must not depend on the parameters.
+            ``control.StateSpace`` or ``control.TransferFunction``, the result of
+            ``linearize``, or a Drake ``Diagram``, alone or as (diagram, context). The
+            number of states must not depend on the parameters.
         box: Interval of each parameter: (low, high), or (low, nominal, high). Without
             a nominal value, the middle is nominal.
         period_s: Sample period of a matrix, s. None: continuous time. A model has its
@@ -182,6 +185,9 @@ def _as_matrix(
     model: Any, period_s: float | None
 ) -> tuple[NDArray[np.float64], float | None]:
     """Returns the matrix A and the period of a model of any accepted type, s."""
+    diagram, context = model if _is_placed(model) else (model, None)
+    if isinstance(diagram, System):
+        model = linearize(diagram, context, inputs=(), outputs=())
     if isinstance(model, np.ndarray | list | tuple):
         matrix = np.asarray(model, dtype=float)
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
@@ -192,3 +198,8 @@ def _as_matrix(
         return matrix, period_s
     linear = as_linear_model(model)
     return linear.A, linear.period_s
+
+
+def _is_placed(model: Any) -> bool:
+    """Whether a model is a diagram with its context."""
+    return isinstance(model, tuple) and len(model) == 2 and isinstance(model[0], System)
