@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from analysis.loops.given_margins import disk_margin, margins
     from analysis.loops.given_oscillations import describing_function
     from analysis.loops.given_robustness import Robustness, robustness
+    from analysis.loops.given_worst_margins import WorstMargins, worst_margins
     from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
@@ -74,6 +75,7 @@ __all__ = [
     "StabilityResult",
     "SweepPlan",
     "SweepResult",
+    "WorstMargins",
     "__version__",
     "add_live_view",
     "array_resolution",
@@ -104,6 +106,7 @@ __all__ = [
     "stability",
     "sweep",
     "worlds",
+    "worst_margins",
 ]
 
 #: Version of the installed package.
@@ -125,6 +128,7 @@ _HOMES = {
     "ResolutionResult": "phonotaxis.arrays",
     "Result": "phonotaxis.result",
     "Robustness": "analysis.loops.given_robustness",
+    "WorstMargins": "analysis.loops.given_worst_margins",
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
@@ -161,6 +165,7 @@ _HOMES = {
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",
     "worlds": "phonotaxis.listings",
+    "worst_margins": "analysis.loops.given_worst_margins",
 }
 
 refuse_clashes()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import System
 
 from analysis.loops.diagram_linearization import linearize
+from analysis.loops.given_box import box_ends, named
 from analysis.loops.given_loops import as_linear_model
 from analysis.loops.growth_bound import MOST_PARTS, Family, GrowthBound, bound_growth
 from analysis.loops.stable_scale import StableScale, stable_scale
@@ -122,12 +123,12 @@ def robustness(
     """
     start = time.perf_counter()
     names = list(box)
-    low, nominal, high = _ends(box)
-    first = _as_matrix(model_of(_named(names, nominal)), period_s)
+    low, nominal, high = box_ends(box)
+    first = _as_matrix(model_of(named(names, nominal)), period_s)
     period = first[1]
 
     def matrix_of(values: Vector) -> NDArray[np.float64]:
-        matrix, own = _as_matrix(model_of(_named(names, values)), period_s)
+        matrix, own = _as_matrix(model_of(named(names, values)), period_s)
         if matrix.shape != first[0].shape or own != period:
             raise InputError(
                 "model_of",
@@ -149,7 +150,7 @@ def _result(
     return Robustness(
         growth_per_s=bound.found_per_s,
         proven_growth_per_s=bound.proven_per_s,
-        worst_values=_named(names, bound.worst),
+        worst_values=named(names, bound.worst),
         scale_proven=scale.proven,
         scale_unstable=scale.unstable,
         scale_largest=scale.largest,
@@ -157,28 +158,6 @@ def _result(
         fit_error=bound.fit_error,
         computing_time_s=seconds,
     )
-
-
-def _named(names: list[str], values: Vector) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(names, values, strict=True)}
-
-
-def _ends(box: Mapping[str, Sequence[float]]) -> tuple[Vector, Vector, Vector]:
-    if not box:
-        raise InputError("box", "is empty; name a parameter with its interval")
-    rows = []
-    for name, ends in box.items():
-        row = list(map(float, ends))
-        if len(row) == 2:
-            row.insert(1, 0.5 * (row[0] + row[1]))
-        if len(row) != 3 or not row[0] <= row[1] <= row[2] or row[0] == row[2]:
-            raise InputError(
-                f"box[{name!r}]",
-                f"is {tuple(ends)}; give (low, high) or (low, nominal, high), in order",
-            )
-        rows.append(row)
-    low, nominal, high = np.array(rows).T
-    return low, nominal, high
 
 
 def _as_matrix(
