@@ -9,7 +9,7 @@ import control
 import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import Gain, Integrator, LinearSystem
+from pydrake.systems.primitives import FirstOrderLowPassFilter, Gain, Integrator
 
 import phonotaxis
 from analysis.loops import worst_margins
@@ -34,11 +34,9 @@ def inner(values):
 def diagram_of(values):
     """The same as a Drake diagram, with the feedback at the gain."""
     builder = DiagramBuilder()
-    one = np.eye(1)
-    system = LinearSystem(-values["p"] * one, one, one, 0.0 * one)
-    lag = builder.AddNamedSystem("lag", system)
+    lag = builder.AddNamedSystem("lag", FirstOrderLowPassFilter(1.0 / values["p"]))
     integrator = builder.AddNamedSystem("integrator", Integrator(1))
-    back = builder.AddNamedSystem("back", Gain(-values["K"], 1))
+    back = builder.AddNamedSystem("back", Gain(-values["K"] / values["p"], 1))
     builder.Connect(lag.get_output_port(), integrator.get_input_port())
     builder.Connect(integrator.get_output_port(), back.get_input_port())
     builder.Connect(back.get_output_port(), lag.get_input_port())
