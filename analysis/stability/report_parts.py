@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from analysis.report.section import Bullets
+from analysis.stability.choice import plans
 from analysis.stability.law_analysis import Part
 from diagrams import Scenario
 
@@ -48,6 +49,8 @@ ROUTE_PARTS = _parts(
 SEARCH_PARTS = _parts(
     "margin_parts.HEADING_LOOP", "robustness_parts.HEADING_ROBUSTNESS"
 )
+#: Parts for a robot with the guarded law.
+DRIVE_PARTS = _parts("drive_parts.DRIVE", "robustness_parts.DRIVE_ROBUSTNESS")
 #: Parts for a robot with a guard, in addition to the others.
 GUARD_PARTS = _parts("safety_parts.GUARD")
 
@@ -58,6 +61,10 @@ _NOT_FOR_ROUTES = (
 _NOT_FOR_SEARCHES = (
     "A search has no virtual mass, no springs and no equilibrium: the following parts, "
     "which are about robots that follow a sound, do not apply."
+)
+_NOT_FOR_PLANS = (
+    "The guarded law has no virtual mass, no springs and no equilibrium: the following "
+    "parts, which are about laws that compute a force, do not apply."
 )
 
 
@@ -73,6 +80,8 @@ def parts_for(scenarios: Sequence[Scenario]) -> tuple[Part[Any], ...]:
     guard = GUARD_PARTS if guarded else ()
     if robot.kind == "router":
         return (*ROUTE_PARTS, _left_out(_NOT_FOR_ROUTES, SOUND_PARTS), *guard)
+    if plans(robot.law):
+        return (*DRIVE_PARTS, _left_out(_NOT_FOR_PLANS, SOUND_PARTS), *guard)
     return (*SOUND_PARTS, *guard)
 
 

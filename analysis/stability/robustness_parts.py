@@ -7,6 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from analysis.loops.drive_families import (
+    drive_families,
+    drive_poles,
+    drive_uncertainty,
+)
 from analysis.loops.heading_families import (
     heading_families,
     heading_poles,
@@ -312,4 +317,25 @@ HEADING_ROBUSTNESS = _part(
     "growth of the heading",
     "it turns to its heading for all parameters in their ranges",
     "some parameters in their ranges make it swing about its heading",
+)
+
+
+def _on_free_floor(study: Study) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        drive_poles(scenario),
+        drive_families(scenario),
+        drive_uncertainty(scenario),
+        samples=4 * _SAMPLES[study.full],
+    )
+
+
+DRIVE_ROBUSTNESS = _part(
+    "drive_robustness",
+    "Robustness on free floor",
+    _on_free_floor,
+    "growth on free floor",
+    "it follows its way for all parameters in their ranges",
+    "some parameters in their ranges make it swing on free floor",
 )
