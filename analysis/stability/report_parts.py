@@ -42,8 +42,8 @@ ROUTE_PARTS = _parts(
     "route_parts.FROZEN_GAINS",
     "robustness_parts.ROUTE_ROBUSTNESS",
     "route_parts.GAIN_BOUNDS",
-    "route_parts.ADAPTATION",
-    "route_parts.ROBOT_CHAIN",
+    "adaptation_parts.ADAPTATION",
+    "chain_parts.ROBOT_CHAIN",
 )
 #: Parts for a robot that searches step by step.
 SEARCH_PARTS = _parts(
