@@ -21,8 +21,9 @@ from analysis.loops.zero_exclusion import Exclusion, exclude_zeros
 
 #: Number of frequencies of the grid, and its ends as shares of the first crossover.
 _POINTS, _LOWEST, _HIGHEST = 400, 1e-3, 1e3
-#: Number of steps by which a gain crossover between two frequencies is refined.
-_STEPS = 4
+#: Number of steps by which a gain crossover, or the frequency of a disk margin, is
+#: refined, and number of frequencies in such a step.
+_STEPS, _FINER = 4, 9
 #: Rates below this share of the largest one count as integrators.
 _INTEGRATOR = 1e-6
 #: Longest arc of the circle of phases that is one axis of a proof, rad.
@@ -214,18 +215,17 @@ class LoopFamily:
     def _grid_powers(self) -> Complex:
         return self.powers(self.grid, self.polynomial.control.shape[-1] // 2 - 1)
 
-    def disk_at(self, shares: Vector, skew: float) -> tuple[float, float]:
-        """Disk margin on the grid at a point of the box, and its frequency, rad/s."""
+    def disk_at(self, shares: Vector, skew: float) -> float:
+        """Disk margin at a point of the box where the closed loop is stable."""
         of = self.disturbed(skew, values=self.polynomial.values(shares))
-        size = _ratio(self._grid_powers @ of.U, self._grid_powers @ of.V)
-        k = int(size.argmin())
-        return float(size[k]), float(self.grid[k])
-
-    def disk_ratio(self, shares: Vector, skew: float, omega: float) -> float:
-        """Size of the disk with a factor that gives L f = -1 at this frequency."""
-        of = self.disturbed(skew, values=self.polynomial.values(shares))
-        powers = self.powers(np.array([omega]), len(of.U) - 1)
-        return float(_ratio(powers @ of.U, powers @ of.V)[0])
+        omega, powers = self.grid, self._grid_powers
+        for _ in range(_STEPS):
+            size = _ratio(powers @ of.U, powers @ of.V)
+            k = int(size.argmin())
+            ends = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
+            omega = np.geomspace(*ends, _FINER)
+            powers = self.powers(omega, len(of.U) - 1)
+        return float(size.min())
 
     def crossovers(self, shares: Vector) -> tuple[Vector, Vector]:
         """Gain crossovers at a point of the box, rad/s, and their delay margins, s."""

@@ -32,6 +32,8 @@ _WIDER, _PROOFS = 3.0, 4
 _RAISES = 10
 #: Number of random points, and of random corners, from which the searches begin.
 _STARTS = 40
+#: Step from a corner along its edges, as a share of the interval.
+_INWARD = 1e-3
 #: Number of first intervals of the frequencies in a proof of a delay.
 _INTERVALS = 16
 #: Relative width below which an interval of frequencies adds few phases to its proof. A
@@ -77,20 +79,7 @@ def bound_disk_margin(
     """
 
     def margin(shares: Vector) -> float:
-        return family.disk_at(shares, skew)[0] if family.stable_at(shares) else 0.0
-
-    def climb(shares: Vector) -> tuple[float, Vector]:
-        size, place = _worst_corner(margin, shares)
-        omega = family.disk_at(place, skew)[1]
-
-        def at(x: Vector) -> float:
-            return family.disk_ratio(np.clip(x[:-1], 0, 1), skew, math.exp(x[-1]))
-
-        if size == 0.0:
-            return 0.0, place
-        found = _descend(at, np.append(place, math.log(omega)))
-        place = np.clip(found[1][:-1], 0.0, 1.0)
-        return min(found[0], margin(place)), place
+        return family.disk_at(shares, skew) if family.stable_at(shares) else 0.0
 
     def prove(size: float) -> Exclusion:
         return family.exclude(
@@ -100,7 +89,7 @@ def bound_disk_margin(
             most_parts,
         )
 
-    bound = _bound(family, margin, climb, prove)
+    bound = _bound(family, margin, prove)
     exact = multiloop_disk_margin(family.model_of(bound.worst), skew)
     return _exact(bound, exact.alpha, exact.frequency_rad_s)
 
@@ -125,13 +114,6 @@ def bound_delay_margin(family: LoopFamily, most_parts: int = MOST_PARTS) -> Marg
             return 0.0
         return float(family.crossovers(shares)[1].min(initial=math.inf))
 
-    def climb(shares: Vector) -> tuple[float, Vector]:
-        delay, place = _worst_corner(margin, shares)
-        if not 0.0 < delay < math.inf:
-            return delay, place
-        found = _descend(lambda x: margin(np.clip(x, 0.0, 1.0)), place)
-        return found[0], np.clip(found[1], 0.0, 1.0)
-
     known = [family.crossovers(each) for each in _starts(family)]
     omega, delays = (np.concatenate(each) for each in zip(*known, strict=True))
 
@@ -145,7 +127,7 @@ def bound_delay_margin(family: LoopFamily, most_parts: int = MOST_PARTS) -> Marg
             family, delay, likely, lambda x: margin(x) < delay, most_parts
         )
 
-    bound = _bound(family, margin, climb, prove)
+    bound = _bound(family, margin, prove)
     exact = loop_margins(family.model_of(bound.worst))
     return _exact(bound, exact.delay_margin_s, exact.delay_frequency_rad_s)
 
@@ -190,11 +172,10 @@ def _prove_delay(
 def _bound(
     family: LoopFamily,
     margin: Margin,
-    climb: Callable[[Vector], tuple[float, Vector]],
     prove: Callable[[float], Exclusion],
 ) -> MarginBound:
     start = min(_starts(family), key=margin)
-    found, place = climb(start)
+    found, place = _climb(margin, start)
     proven, parts, gap, proofs, raises = 0.0, 0, _GAP, 0, 0
     while found > 0.0 and proofs < _PROOFS and raises < _RAISES:
         result = prove((1.0 - gap) * found)
@@ -203,7 +184,7 @@ def _bound(
             proven = (1.0 - gap) * found
             break
         if result.shares is not None:
-            lower = climb(result.shares)
+            lower = _climb(margin, result.shares)
             raises += 1
             if lower[0] < found:
                 found, place = lower
@@ -239,15 +220,33 @@ def _worst_corner(margin: Margin, shares: Vector) -> tuple[float, Vector]:
     return least, place
 
 
-def _descend(function: Margin, start: Vector) -> tuple[float, Vector]:
-    """Smallest value from a point on, by the search of Nelder and Mead."""
+def _climb(margin: Margin, shares: Vector) -> tuple[float, Vector]:
+    """Searches a smaller margin from a point of the box on.
+
+    The search of ``_worst_corner`` is followed by that of Nelder and Mead, unless a
+    corner is the worst point near it.
+    """
+    least, place = _worst_corner(margin, shares)
+    if not 0.0 < least < math.inf or _is_worst_near(margin, least, place):
+        return least, place
     found = minimize(
-        function,
-        start,
+        lambda x: margin(np.clip(x, 0.0, 1.0)),
+        place,
         method="Nelder-Mead",
-        options={"xatol": 1e-7, "fatol": 1e-11, "maxiter": 80 * len(start)},
+        options={"xatol": 1e-7, "fatol": 1e-11, "maxiter": 80 * len(place)},
     )
-    first = function(start)
-    if found.fun < first:
-        return float(found.fun), np.asarray(found.x)
-    return first, start
+    if found.fun < least:
+        return float(found.fun), np.clip(found.x, 0.0, 1.0)
+    return least, place
+
+
+def _is_worst_near(margin: Margin, least: float, place: Vector) -> bool:
+    """Whether a point is a corner from which the margin grows along each edge."""
+    for k, share in enumerate(place):
+        if share not in {0.0, 1.0}:
+            return False
+        inner = place.copy()
+        inner[k] += _INWARD if share == 0.0 else -_INWARD
+        if margin(inner) <= least:
+            return False
+    return True
