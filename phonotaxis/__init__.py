@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from analysis.loops.diagram_linearization import linearize
     from analysis.loops.given_bursts import burst_cycle
     from analysis.loops.given_delays import delay_margin
-    from analysis.loops.given_loops import disk_margin, loop_at, margins
+    from analysis.loops.given_loops import loop_at
+    from analysis.loops.given_margins import disk_margin, margins
     from analysis.loops.given_oscillations import describing_function
     from analysis.loops.given_robustness import Robustness, robustness
+    from analysis.loops.given_worst_margins import WorstMargins, worst_margins
     from analysis.loops.linearized_diagram import LinearizedDiagram
     from analysis.run_error import RunError
     from analysis.runs.columns import columns
@@ -73,6 +75,7 @@ __all__ = [
     "StabilityResult",
     "SweepPlan",
     "SweepResult",
+    "WorstMargins",
     "__version__",
     "add_live_view",
     "array_resolution",
@@ -103,6 +106,7 @@ __all__ = [
     "stability",
     "sweep",
     "worlds",
+    "worst_margins",
 ]
 
 #: Version of the installed package.
@@ -124,6 +128,7 @@ _HOMES = {
     "ResolutionResult": "phonotaxis.arrays",
     "Result": "phonotaxis.result",
     "Robustness": "analysis.loops.given_robustness",
+    "WorstMargins": "analysis.loops.given_worst_margins",
     "RunError": "analysis.run_error",
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
@@ -142,10 +147,10 @@ _HOMES = {
     "delay_margin": "analysis.loops.given_delays",
     "describing_function": "analysis.loops.given_oscillations",
     "burst_cycle": "analysis.loops.given_bursts",
-    "disk_margin": "analysis.loops.given_loops",
+    "disk_margin": "analysis.loops.given_margins",
     "laws": "phonotaxis.listings",
     "loop_at": "analysis.loops.given_loops",
-    "margins": "analysis.loops.given_loops",
+    "margins": "analysis.loops.given_margins",
     "robustness": "analysis.loops.given_robustness",
     "library_scenarios": "diagrams.scenario.loading",
     "linearize": "analysis.loops.diagram_linearization",
@@ -160,6 +165,7 @@ _HOMES = {
     "stability": "phonotaxis.loops",
     "sweep": "phonotaxis.batches",
     "worlds": "phonotaxis.listings",
+    "worst_margins": "analysis.loops.given_worst_margins",
 }
 
 refuse_clashes()

@@ -40,7 +40,7 @@ REFUSALS = (
     ("simulate", "--set", "microphones.ego_noise_file=cut.wav"),
     ("design", "--set", "tick_s=0.0333333"),
     ("stability", "--robot", "second"),
-    ("stability", "--law", "guarded"),
+    ("stability", "--law", "dwa"),
     ("stability", "--law", "law.py:law"),
     ("compare", "--set", "tick_s=0.0333333"),
     ("compare", "two_static_obstacles", "--grid", "tick_s=[0.025, 0.0333333]"),

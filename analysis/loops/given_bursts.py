@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from analysis.loops.given_loops import as_linear_model
+from analysis.loops.given_loops import Loop, as_linear_model
 from analysis.loops.linear_models import LinearModel
 from systems.framework.input_error import InputError
 
@@ -60,7 +60,13 @@ class LoopBurstCycle:
 
 
 def burst_cycle(
-    loop: Any, on_s: float, off_s: float, *, hold: Literal["zero", "last"] = "last"
+    loop: Loop,
+    on_s: float,
+    off_s: float,
+    context: Any = None,
+    port: Any = None,
+    *,
+    hold: Literal["zero", "last"] = "last",
 ) -> LoopBurstCycle:
     """Computes the growth of a loop that is closed only part of the time.
 
@@ -71,10 +77,12 @@ def burst_cycle(
 
     Args:
         loop: Loop transfer function L, of the types of ``margins`` except frequency
-            responses, with as many outputs as inputs. For a Drake diagram, give the
-            result of ``loop_at``.
+            responses, with as many outputs as inputs.
         on_s: Time per cycle for which the loop is closed, s, > 0.
         off_s: Time per cycle for which the loop is open, s, >= 0.
+        context: Root context of the diagram; None: the default context. Only for
+            diagrams.
+        port: Input port inside the diagram, as for ``loop_at``. Only for diagrams.
         hold: Input while the loop is open: ``zero``, or the ``last`` value.
 
     Returns:
@@ -85,7 +93,7 @@ def burst_cycle(
             periods.
         InputError: ``hold`` is unknown, or the loop is not square.
     """
-    model = as_linear_model(loop)
+    model = as_linear_model(loop, context, port)
     width = model.B.shape[1]
     if model.C.shape[0] != width:
         raise InputError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -14,9 +14,23 @@ from pydrake.systems.framework import System
 from scipy.optimize import brentq
 
 from analysis.loops.diagram_linearization import linearized, map_over_period
-from analysis.loops.given_loops import OpenedLoop, as_linear_model, opened_loop
+from analysis.loops.given_loops import (
+    Loop,
+    OpenedLoop,
+    as_linear_model,
+    is_response,
+    opened_loop,
+    refuse_place_without_diagram,
+)
 from analysis.loops.linear_models import NEUTRAL, LinearModel
 from analysis.loops.loop_margins import loop_margins
+from analysis.loops.margin_results import LoopMargins
+from analysis.loops.response_margins import (
+    measured_response,
+    nyquist_stable,
+    response_margins,
+    response_period,
+)
 from systems.framework.input_error import InputError
 
 #: Longest delay of a sampled loop that the search tries, in periods.
@@ -64,7 +78,9 @@ class LoopDelayMargin:
         }
 
 
-def delay_margin(loop: Any, context: Any = None, port: Any = None) -> LoopDelayMargin:
+def delay_margin(
+    loop: Loop, context: Any = None, port: Any = None, *, unstable_poles: int = 0
+) -> LoopDelayMargin:
     """Computes the smallest delay that makes a closed loop unstable.
 
     - Continuous model: exact, from the phases at all gain crossovers.
@@ -76,13 +92,17 @@ def delay_margin(loop: Any, context: Any = None, port: Any = None) -> LoopDelayM
       over one period in which the input changes at the end of this part. If the port
       belongs to a sampled block, only whole periods count, because the block reads its
       input once per period.
+    - Frequency response: as for a model, from its interpolation and the Nyquist
+      criterion.
 
     Args:
         loop: Loop transfer function with one input and one output, of the types of
-            ``margins``; or a Drake ``Diagram``.
+            ``margins``.
         context: Root context of the diagram at the operating point; None: the default
             context. Only for diagrams.
         port: Input port inside the diagram, as for ``loop_at``. Only for diagrams.
+        unstable_poles: Number of growing poles of L. It is needed only for frequency
+            responses.
 
     Returns:
         Smallest destabilizing delay, and the frequency of the oscillation.
@@ -91,35 +111,50 @@ def delay_margin(loop: Any, context: Any = None, port: Any = None) -> LoopDelayM
         InputError: The loop is unstable without a delay.
         InputError: A port is missing, or ``loop`` is not one loop.
     """
+    if is_response(loop):
+        refuse_place_without_diagram(loop, context, port)
+        return _of_response(loop, unstable_poles)
     if isinstance(loop, System):
-        if port is None:
-            raise InputError(
-                "port", "is missing; name the input port to delay: port='block.port'"
-            )
         opened = opened_loop(loop, context, port)
         model = opened.model
     else:
-        opened, model = None, as_linear_model(loop)
+        opened, model = None, as_linear_model(loop, context, port)
     if model.period_s is None:
-        return _continuous(model)
+        return _continuous(loop_margins(model))
     if opened is not None and opened.read_after:
         step_at = partial(_diagram_step, loop, context, port, opened)
         return _sampled(model, step_at, whole_periods=False)
     return _sampled(model, partial(_model_step, model), whole_periods=True)
 
 
-def _continuous(model: LinearModel) -> LoopDelayMargin:
-    found = loop_margins(model)
+def _continuous(found: LoopMargins) -> LoopDelayMargin:
     if not found.stable:
-        raise _unstable(model)
+        raise _unstable(found.name)
     delay, omega = found.delay_margin_s, found.delay_frequency_rad_s
-    return LoopDelayMargin(model.name, delay, omega, None, whole_periods=False)
+    return LoopDelayMargin(found.name, delay, omega, None, whole_periods=False)
 
 
-def _unstable(model: LinearModel) -> InputError:
+def _of_response(data: Any, unstable_poles: int) -> LoopDelayMargin:
+    response, stable = measured_response(data, unstable_poles, 0.0)
+    margin = _continuous(response_margins(response, stable=stable))
+    period = response_period(data)
+    if period is None:
+        return margin
+    late = replace(margin, delay_s=math.inf, period_s=period, whole_periods=True)
+    if not margin.delay_s < _MOST_PERIODS * period:
+        return replace(late, frequency_rad_s=math.nan)
+    omega = response.omega
+    for count in range(math.floor(margin.delay_s / period), _MOST_PERIODS):
+        L = response.at(omega) * np.exp(-1j * omega * count * period)
+        if not nyquist_stable(omega, L, unstable_poles):
+            return replace(late, delay_s=count * period)
+    return replace(late, frequency_rad_s=math.nan)
+
+
+def _unstable(name: str) -> InputError:
     return InputError(
         "loop",
-        f"{model.name} is unstable without a delay, and has no delay margin; check the "
+        f"{name} is unstable without a delay, and has no delay margin; check the "
         "sign of the feedback (it is negative) and the operating point",
     )
 
@@ -168,7 +203,7 @@ def _sampled(
     """Searches the smallest delay at which the largest |z| reaches 1."""
     period = model.period_s or 0.0
     if _largest_pole(_model_step(model), 0)[0] >= 1.0:
-        raise _unstable(model)
+        raise _unstable(model.name)
     guess = loop_margins(model).delay_margin_s / period
     none = LoopDelayMargin(model.name, math.inf, math.nan, period, whole_periods)
     if not guess < _MOST_PERIODS:

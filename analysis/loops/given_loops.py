@@ -1,27 +1,34 @@
-"""Loops that users give: models of the ``control`` package, or Drake diagrams."""
+"""Loops that users give: models of the ``control`` package, or Drake diagrams.
+
+All functions for loops of users accept the same types, see ``Loop``.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.systems.framework import System
 
 from analysis.loops.diagram_linearization import linearize
 from analysis.loops.diagram_ports import find_source
 from analysis.loops.linear_models import LinearModel
 from analysis.loops.linearized_diagram import LinearizedDiagram
-from analysis.loops.loop_margins import loop_margins
-from analysis.loops.margin_results import LoopMargins
-from analysis.loops.multiloop_disk import MultiloopDiskMargin, multiloop_disk_margin
-from analysis.loops.response_margins import (
-    delayed_response,
-    measured_response,
-    response_margins,
-)
+from analysis.loops.response_margins import response_period
 from systems.framework.input_error import InputError
+
+if TYPE_CHECKING:
+    import control
+
+#: Loop of a user: a linear model, a frequency response, or a Drake diagram, which is
+#: opened at a port.
+Loop: TypeAlias = (
+    "LinearModel | LinearizedDiagram | control.StateSpace | control.TransferFunction"
+    " | control.FrequencyResponseData | System"
+)
 
 #: Largest relative difference between equal matrices.
 _SAME = 1e-6
@@ -73,6 +80,12 @@ class OpenedLoop(NamedTuple):
 
 def opened_loop(diagram: Any, context: Any, port: Any) -> OpenedLoop:
     """Opens a loop as ``loop_at`` does, and states how the port receives the signal."""
+    if port is None:
+        raise InputError(
+            "port",
+            "is missing; name the input port at which to open the loop: "
+            "port='block.port'",
+        )
     source = find_source(diagram, port)
     closed = linearize(diagram, context, inputs=(), outputs=()).model
     # A continuous block receives the signal as it is after the updates, and a sampled
@@ -106,115 +119,32 @@ def _size(matrix: NDArray[np.float64]) -> float:
     return max(1.0, float(np.abs(matrix).max(initial=0.0)))
 
 
-def margins(loop: Any, *, delay_s: float = 0.0, unstable_poles: int = 0) -> LoopMargins:
-    """Computes the stability margins of a loop with negative feedback.
+def as_linear_model(loop: Loop, context: Any = None, port: Any = None) -> LinearModel:
+    """Converts a loop of any type that has states; the arguments are those of users.
 
-    Args:
-        loop: Loop transfer function L with one input and one output: a
-            ``control.StateSpace`` or ``control.TransferFunction``, continuous or
-            sampled; a ``control.FrequencyResponseData``; or the result of ``loop_at``
-            or ``linearize``.
-        delay_s: Pure delay of the loop in addition to that of ``loop``, s, >= 0. In a
-            sampled loop, it is a whole number of periods.
-        unstable_poles: Number of growing poles of L. It is needed only for frequency
-            responses, which do not tell it.
-
-    Returns:
-        Gain, phase, delay, modulus and disk margins, and peaks of S and T. Those of a
-        frequency response hold for its interpolation between the given frequencies.
-
-    Raises:
-        InputError: ``loop`` is not a model, or has several inputs or outputs.
-        InputError: A frequency response has too few points, or does not decide whether
-            the closed loop is stable.
-        InputError: The delay is negative, or no whole number of periods.
+    Raises InputError for a frequency response and for other types.
     """
-    from control import FrequencyResponseData
-
-    if not 0.0 <= delay_s < math.inf:
-        raise InputError("delay_s", f"is {delay_s:g}; give a time of 0 or more, in s")
-    if isinstance(loop, FrequencyResponseData):
-        given, stable = measured_response(loop, unstable_poles, delay_s)
-        return response_margins(given, stable=stable)
-    model = as_linear_model(loop)
-    if not delay_s:
-        return loop_margins(model)
-    if model.period_s:
-        return loop_margins(delayed_model(model, delay_s))
-    given, stable = delayed_response(model, delay_s)
-    return response_margins(given, stable=stable)
-
-
-def delayed_model(model: LinearModel, delay_s: float) -> LinearModel:
-    """Adds a delay of whole periods to the output of a sampled model.
-
-    Raises InputError for any other delay.
-    """
-    periods = delay_s / (model.period_s or 1.0)
-    count = round(periods)
-    if abs(periods - count) > _WHOLE:
-        raise InputError(
-            "delay_s",
-            f"is {periods:.4g} periods of {model.period_s:g} s; a sampled model has no "
-            "motion between two samples: give a multiple of the period, or a diagram "
-            "and a port to delay_margin",
-        )
-    if count == 0:
-        return model
-    n = len(model.A)
-    A: NDArray[np.float64] = np.zeros((n + count, n + count))
-    A[:n, :n], A[n, :n] = model.A, model.C[0]
-    A[n + 1 :, n:-1] = np.eye(count - 1)
-    B = np.zeros((n + count, 1))
-    B[:n], B[n] = model.B, model.D[0]
-    C = np.zeros((1, n + count))
-    C[0, -1] = 1.0
-    late = tuple(f"late_{k + 1}" for k in range(count))
-    return replace(
-        model,
-        A=A,
-        B=B,
-        C=C,
-        D=np.zeros((1, 1)),
-        state_names=(*model.state_names, *late),
-    )
-
-
-def disk_margin(loop: Any, skew: float = 0.0) -> MultiloopDiskMargin:
-    """Computes the disk margin of one loop, or of several loops at the same time.
-
-    Args:
-        loop: Loop transfer function L with as many outputs as inputs, of the types of
-            ``margins``. The feedback is negative.
-        skew: Skew of the disk, -1 to 1. With 0, gain increase and gain reduction count
-            alike.
-
-    Returns:
-        Largest disk of gain and phase changes in all loops for which stability is
-        guaranteed, and the smallest disk with a destabilizing change that was found.
-
-    Raises:
-        InputError: ``loop`` is not a model, or is not square.
-    """
-    if not -1.0 <= skew <= 1.0:
-        raise InputError("skew", f"is {skew:g}; give a number from -1 to 1")
-    return multiloop_disk_margin(as_linear_model(loop), skew)
-
-
-def as_linear_model(loop: Any) -> LinearModel:
-    """Converts a model of any accepted type."""
+    refuse_place_without_diagram(loop, context, port)
     if isinstance(loop, LinearModel):
         return loop
     if isinstance(loop, LinearizedDiagram):
         return loop.model
+    if isinstance(loop, System):
+        return opened_loop(loop, context, port).model
     import control
 
+    if is_response(loop):
+        raise InputError(
+            "loop",
+            "is a frequency response, which has no states; give a model, for example "
+            "a fit: control.StateSpace or control.TransferFunction",
+        )
     if not isinstance(loop, control.StateSpace | control.TransferFunction):
         raise InputError(
             "loop",
-            f"is a {type(loop).__name__}; give a control.StateSpace or "
-            "control.TransferFunction, or open a diagram by loop_at(diagram, context, "
-            "'block.port')",
+            f"is a {type(loop).__name__}; give a control.StateSpace, "
+            "control.TransferFunction or control.FrequencyResponseData, or a Drake "
+            "diagram with port='block.port'",
         )
     if loop.dt is True:
         raise InputError(
@@ -232,3 +162,71 @@ def as_linear_model(loop: Any) -> LinearModel:
         output_names=tuple(system.output_labels),
         period_s=system.dt or None,
     )
+
+
+def is_response(loop: Loop) -> TypeGuard[Any]:
+    """Whether a loop is a ``control.FrequencyResponseData``."""
+    from control import FrequencyResponseData
+
+    return isinstance(loop, FrequencyResponseData)
+
+
+def refuse_place_without_diagram(loop: Loop, context: Any, port: Any) -> None:
+    """Raises InputError if a context or port is given without a Drake diagram."""
+    for name, value in (("context", context), ("port", port)):
+        if value is not None and not isinstance(loop, System):
+            raise InputError(
+                name,
+                f"is {value!r}, but the loop is a {type(loop).__name__}; give {name} "
+                "only with a Drake diagram, and other options by name",
+            )
+
+
+def delayed_model(model: LinearModel, delay_s: float) -> LinearModel:
+    """Adds a delay of whole periods to all outputs of a sampled model.
+
+    Raises InputError for any other delay.
+    """
+    count = whole_periods(delay_s, model.period_s or 1.0)
+    if count == 0:
+        return model
+    n, width = len(model.A), len(model.C)
+    more = count * width
+    A: NDArray[np.float64] = np.zeros((n + more, n + more))
+    A[:n, :n], A[n : n + width, :n] = model.A, model.C
+    A[n + width :, n : n + more - width] = np.eye(more - width)
+    B = np.zeros((n + more, model.B.shape[1]))
+    B[:n], B[n : n + width] = model.B, model.D
+    C = np.zeros((width, n + more))
+    C[:, n + more - width :] = np.eye(width)
+    late = tuple(f"late_{k + 1}" for k in range(more))
+    return replace(
+        model,
+        A=A,
+        B=B,
+        C=C,
+        D=np.zeros_like(model.D),
+        state_names=(*model.state_names, *late),
+    )
+
+
+def check_delay(loop: Loop, delay_s: float) -> None:
+    """Raises InputError for a delay that is negative or no whole number of periods."""
+    if not 0.0 <= delay_s < math.inf:
+        raise InputError("delay_s", f"is {delay_s:g}; give a time of 0 or more, in s")
+    if is_response(loop) and (period := response_period(loop)):
+        whole_periods(delay_s, period)
+
+
+def whole_periods(delay_s: float, period_s: float) -> int:
+    """Number of periods of a delay; InputError if it is not a whole number."""
+    periods = delay_s / period_s
+    count = round(periods)
+    if abs(periods - count) > _WHOLE:
+        raise InputError(
+            "delay_s",
+            f"is {periods:.4g} periods of {period_s:g} s; a sampled loop has no "
+            "motion between two samples: give a multiple of the period, or a diagram "
+            "and a port to delay_margin",
+        )
+    return count

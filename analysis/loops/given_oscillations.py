@@ -12,7 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import root
 
 from analysis.loops.frequency_levels import frequency_grid
-from analysis.loops.given_loops import as_linear_model, delayed_model
+from analysis.loops.given_loops import (
+    Loop,
+    as_linear_model,
+    check_delay,
+    delayed_model,
+    is_response,
+    refuse_place_without_diagram,
+)
 from analysis.loops.linear_models import LinearModel
 from analysis.loops.loop_margins import loop_margins
 from analysis.loops.response_margins import (
@@ -20,6 +27,7 @@ from analysis.loops.response_margins import (
     delayed_response,
     measured_response,
     nyquist_stable,
+    response_period,
     stable_with_delay,
 )
 from systems.framework.input_error import InputError
@@ -75,8 +83,10 @@ class PredictedCycles:
 
 
 def describing_function(
-    loop: Any,
+    loop: Loop,
     nonlinearity: Any,
+    context: Any = None,
+    port: Any = None,
     *,
     amplitudes: ArrayLike | None = None,
     delay_s: float = 0.0,
@@ -96,6 +106,9 @@ def describing_function(
         nonlinearity: A ``control.DescribingFunctionNonlinearity``, for example
             ``control.saturation_nonlinearity(1.0)``, or a function of one number
             without memory that is odd.
+        context: Root context of the diagram; None: the default context. Only for
+            diagrams.
+        port: Input port inside the diagram, as for ``loop_at``. Only for diagrams.
         amplitudes: (n,) amplitudes between which cycles are sought, > 0, in the unit of
             the input of the nonlinearity. None: 600 from 0.001 to 1,000.
         delay_s: Pure delay in addition to that of the loop, s, >= 0.
@@ -107,8 +120,14 @@ def describing_function(
 
     Raises:
         InputError: ``loop`` is not one loop, or the amplitudes are not positive.
+        InputError: The delay is negative, or no whole number of periods.
     """
-    given = _loop(loop, delay_s, unstable_poles)
+    check_delay(loop, delay_s)
+    if is_response(loop):
+        refuse_place_without_diagram(loop, context, port)
+        given = _measured(loop, delay_s, unstable_poles)
+    else:
+        given = _modeled(as_linear_model(loop, context, port), delay_s)
     response = given.response
     sizes = np.unique(_AMPLITUDES if amplitudes is None else np.asarray(amplitudes))
     if len(sizes) < 2 or not sizes[0] > 0.0 or not np.isfinite(sizes).all():
@@ -151,18 +170,17 @@ class _Loop(NamedTuple):
     """Returns whether the loop is stable with a factor in place of the nonlinearity."""
 
 
-def _loop(loop: Any, delay_s: float, unstable_poles: int) -> _Loop:
-    from control import FrequencyResponseData
+def _measured(data: Any, delay_s: float, unstable_poles: int) -> _Loop:
+    measured, _ = measured_response(data, unstable_poles, delay_s)
+    L, period = measured.at(measured.omega), response_period(data)
+    return _Loop(
+        measured,
+        math.pi / period if period else math.inf,
+        lambda factor: nyquist_stable(measured.omega, factor * L, unstable_poles),
+    )
 
-    if isinstance(loop, FrequencyResponseData):
-        measured, _ = measured_response(loop, unstable_poles, delay_s)
-        L = measured.at(measured.omega)
-        return _Loop(
-            measured,
-            math.pi / loop.dt if loop.dt else math.inf,
-            lambda factor: nyquist_stable(measured.omega, factor * L, unstable_poles),
-        )
-    model = as_linear_model(loop)
+
+def _modeled(model: LinearModel, delay_s: float) -> _Loop:
     if model.B.shape[1] != 1 or model.C.shape[0] != 1:
         raise InputError(
             "loop",

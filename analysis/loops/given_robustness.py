@@ -10,7 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.systems.framework import System
 
+from analysis.loops.diagram_linearization import linearize
+from analysis.loops.given_box import box_ends, named
 from analysis.loops.given_loops import as_linear_model
 from analysis.loops.growth_bound import MOST_PARTS, Family, GrowthBound, bound_growth
 from analysis.loops.stable_scale import StableScale, stable_scale
@@ -102,8 +105,9 @@ def robustness(
 
     Args:
         model_of: Returns the closed loop for parameters by name: an (n, n) matrix A, a
-            ``control.StateSpace`` or ``control.TransferFunction``, or a
-            ``LinearModel``. The number of states must not depend on the parameters.
+            ``control.StateSpace`` or ``control.TransferFunction``, the result of
+            ``linearize``, or a Drake ``Diagram``, alone or as (diagram, context). The
+            number of states must not depend on the parameters.
         box: Interval of each parameter: (low, high), or (low, nominal, high). Without
             a nominal value, the middle is nominal.
         period_s: Sample period of a matrix, s. None: continuous time. A model has its
@@ -119,12 +123,12 @@ def robustness(
     """
     start = time.perf_counter()
     names = list(box)
-    low, nominal, high = _ends(box)
-    first = _as_matrix(model_of(_named(names, nominal)), period_s)
+    low, nominal, high = box_ends(box)
+    first = _as_matrix(model_of(named(names, nominal)), period_s)
     period = first[1]
 
     def matrix_of(values: Vector) -> NDArray[np.float64]:
-        matrix, own = _as_matrix(model_of(_named(names, values)), period_s)
+        matrix, own = _as_matrix(model_of(named(names, values)), period_s)
         if matrix.shape != first[0].shape or own != period:
             raise InputError(
                 "model_of",
@@ -146,7 +150,7 @@ def _result(
     return Robustness(
         growth_per_s=bound.found_per_s,
         proven_growth_per_s=bound.proven_per_s,
-        worst_values=_named(names, bound.worst),
+        worst_values=named(names, bound.worst),
         scale_proven=scale.proven,
         scale_unstable=scale.unstable,
         scale_largest=scale.largest,
@@ -156,32 +160,13 @@ def _result(
     )
 
 
-def _named(names: list[str], values: Vector) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(names, values, strict=True)}
-
-
-def _ends(box: Mapping[str, Sequence[float]]) -> tuple[Vector, Vector, Vector]:
-    if not box:
-        raise InputError("box", "is empty; name a parameter with its interval")
-    rows = []
-    for name, ends in box.items():
-        row = list(map(float, ends))
-        if len(row) == 2:
-            row.insert(1, 0.5 * (row[0] + row[1]))
-        if len(row) != 3 or not row[0] <= row[1] <= row[2] or row[0] == row[2]:
-            raise InputError(
-                f"box[{name!r}]",
-                f"is {tuple(ends)}; give (low, high) or (low, nominal, high), in order",
-            )
-        rows.append(row)
-    low, nominal, high = np.array(rows).T
-    return low, nominal, high
-
-
 def _as_matrix(
     model: Any, period_s: float | None
 ) -> tuple[NDArray[np.float64], float | None]:
     """Returns the matrix A and the period of a model of any accepted type, s."""
+    diagram, context = model if _is_placed(model) else (model, None)
+    if isinstance(diagram, System):
+        model = linearize(diagram, context, inputs=(), outputs=())
     if isinstance(model, np.ndarray | list | tuple):
         matrix = np.asarray(model, dtype=float)
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
@@ -192,3 +177,8 @@ def _as_matrix(
         return matrix, period_s
     linear = as_linear_model(model)
     return linear.A, linear.period_s
+
+
+def _is_placed(model: Any) -> bool:
+    """Whether a model is a diagram with its context."""
+    return isinstance(model, tuple) and len(model) == 2 and isinstance(model[0], System)

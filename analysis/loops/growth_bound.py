@@ -133,7 +133,8 @@ class Family:
         order = self.polynomial.control.shape[-1] - 1
         numerator, denominator = self._boundary(growth, near)
         return exclude_zeros(
-            self.polynomial,
+            self.polynomial.control,
+            self.polynomial.error,
             homogeneous(numerator, denominator, order),
             lambda shares: self.growth_at(shares)[0] > growth,
             most_parts,

@@ -7,9 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.loops.growth_bound import Family
 from analysis.loops.heading_loop import heading_loop
-from analysis.loops.motion_families import Box, BoxFamilies, interval_family, of_box
+from analysis.loops.motion_families import (
+    Box,
+    BoxFamilies,
+    ClosedLoop,
+    MotionFamily,
+    interval_family,
+    of_box,
+)
 from analysis.loops.robustness import (
     LAG_REASON,
     WHEEL_RADIUS,
@@ -36,11 +42,12 @@ def heading_families(scenario: Scenario) -> BoxFamilies:
     """Returns a function from a box to the closed loops of the heading."""
     motors, robot = scenario.searcher.motor_driver, scenario.only.robot
 
-    def closed(lag: float, strength: float, radius: float) -> NDArray[np.float64]:
+    def closed(lag: float, strength: float, radius: float) -> ClosedLoop:
         loop = heading_loop(motors, robot, lag, scenario.tick_s)
-        return loop.A - strength * radius * loop.B @ loop.C
+        A = loop.A - strength * radius * loop.B @ loop.C
+        return ClosedLoop(A, loop.B, strength * radius * loop.C)
 
-    def families(box: Box) -> Sequence[Family]:
+    def families(box: Box) -> Sequence[MotionFamily]:
         names = ("plant.motor_lag_s", "motor_strength", "wheel_radius_share")
         nominal = (scenario.only.plant.motor_lag_s, 1.0, 1.0)
         intervals = [of_box(box, *each) for each in zip(names, nominal, strict=True)]

@@ -14,6 +14,11 @@ from analysis.loops.linear_models import growth_per_s
 from analysis.loops.motion_families import Box, BoxFamilies
 from analysis.loops.robustness import PoleCloud, UncertainParameter
 from analysis.loops.stable_scale import stable_scale
+from analysis.loops.worst_margins import (
+    MarginBound,
+    bound_delay_margin,
+    bound_disk_margin,
+)
 from systems.framework.input_error import InputError
 
 #: Largest difference between the growth rates of a loop and of its family, 1/s.
@@ -27,8 +32,20 @@ Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class WorstOf:
+    """Smallest margin of all loops in the box, from both sides."""
+
+    found: float
+    """Smallest margin that was found; 0 if an unstable loop was found."""
+    proven: float
+    """Margin that every loop has; 0 if nothing was proven."""
+    frequency_rad_s: float
+    """Frequency of the oscillation at the margin that was found, rad/s."""
+
+
+@dataclass(frozen=True)
 class LoopBound:
-    """Growth rate that no parameters in the box exceed, and the stable scale."""
+    """Growth rate that no parameters in the box exceed, stable scale, and margins."""
 
     proven_growth_per_s: float
     """Growth rate that is not exceeded, 1/s. Infinite if nothing was proven."""
@@ -43,8 +60,13 @@ class LoopBound:
     """Smallest factor for which an unstable loop was found; infinite if none was."""
     scale_largest: float
     """Largest factor that was examined."""
+    disk_margin: WorstOf
+    """Disk margin with skew 0 of the loops, opened at the acceleration that the law
+    commands, or at the deviation of the heading."""
+    delay_margin_s: WorstOf
+    """Delay margin of the same loops, s. A delay is a whole number of ticks."""
     parts: int
-    """Number of parts of box and frequencies in the proof."""
+    """Number of parts of box and frequencies in the proof of the growth rate."""
     computing_time_s: float
 
 
@@ -60,7 +82,7 @@ def bound_loop(
             1/s, if the poles of the cloud are those of the family.
 
     Returns:
-        The bound, and the scale of the box up to which all loops are stable.
+        The bound, the scale of the box up to which all loops are stable, and margins.
 
     Raises:
         InputError: The families do not describe the loop.
@@ -68,7 +90,8 @@ def bound_loop(
     start = time.perf_counter()
     scale = _scale(families_of, cloud.parameters)
     box = _box(cloud.parameters, [(p.low, p.high) for p in cloud.parameters])
-    bounds = [bound_growth(family) for family in families_of(box)]
+    families = families_of(box)
+    bounds = [bound_growth(family) for family in families]
     error = max(known_error_per_s, _model_error(families_of, cloud))
     if error > _SAME:
         raise InputError(
@@ -80,9 +103,17 @@ def bound_loop(
         max(bound.proven_per_s for bound in bounds) + _SAFETY * error,
         error,
         *scale,
+        _worst([bound_disk_margin(family.opened) for family in families]),
+        _worst([bound_delay_margin(family.opened) for family in families]),
         sum(bound.parts for bound in bounds),
         round(time.perf_counter() - start, 3),
     )
+
+
+def _worst(bounds: Sequence[MarginBound]) -> WorstOf:
+    worst = min(bounds, key=lambda bound: bound.found)
+    proven = min(bound.proven for bound in bounds)
+    return WorstOf(worst.found, proven, worst.frequency_rad_s)
 
 
 def _box(

@@ -10,6 +10,8 @@ stiffness. If these four are independent, so are their intervals.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,8 @@ from numpy.typing import NDArray
 from analysis.loops.equilibria import nearest_equilibrium
 from analysis.loops.force_field import ForceField
 from analysis.loops.growth_bound import Family
+from analysis.loops.linear_models import LinearModel
+from analysis.loops.loop_family import LoopFamily
 from analysis.loops.operating_points import FLAT, OperatingPoint
 from analysis.loops.parameter_polynomial import ParameterPolynomial, fit_polynomial
 from analysis.loops.robustness import range_slope
@@ -31,19 +35,61 @@ Vector = NDArray[np.float64]
 Interval = tuple[float, float]
 #: Intervals of the uncertain parameters, by name.
 Box = Mapping[str, Interval]
+
+
+class ClosedLoop(NamedTuple):
+    """Sampled loop with feedback u = -C x, where u acts through B."""
+
+    A: NDArray[np.float64]
+    """(n, n) matrix of the closed loop."""
+    B: NDArray[np.float64]
+    """(n, 1) effect of u over one period."""
+    C: NDArray[np.float64]
+    """(1, n) feedback."""
+
+
+class MotionFamily(Family):
+    """Loops whose motion and margins depend on parameters in a box."""
+
+    def __init__(
+        self,
+        loop_of: Callable[[Vector], ClosedLoop],
+        period_s: float,
+        low: Vector,
+        high: Vector,
+    ) -> None:
+        """Stores the loops; the arguments are those of ``Family``."""
+        super().__init__(lambda values: loop_of(values).A, period_s, low, high)
+        self._loop_of = loop_of
+
+    @cached_property
+    def opened(self) -> LoopFamily:
+        """The loops, opened at the feedback."""
+
+        def model_of(values: Vector) -> LinearModel:
+            loop = self._loop_of(values)
+            names = tuple(f"x{k}" for k in range(len(loop.A)))
+            A, D = loop.A + loop.B @ loop.C, np.zeros((1, 1))
+            return LinearModel(
+                "loop", A, loop.B, loop.C, D, names, ("u",), ("y",), self.period_s
+            )
+
+        return LoopFamily(model_of, self.low, self.high)
+
+
 #: Function from a box to the loops in it. Each family is one direction of motion.
-BoxFamilies = Callable[[Box], Sequence[Family]]
+BoxFamilies = Callable[[Box], Sequence[MotionFamily]]
 
 
 def interval_family(
-    matrix_of: Callable[..., NDArray[np.float64]],
+    loop_of: Callable[..., ClosedLoop],
     intervals: Sequence[Interval],
     period_s: float,
-) -> Family:
-    """Returns the loops of a matrix whose arguments are known to lie in intervals.
+) -> MotionFamily:
+    """Returns the loops whose arguments are known to lie in intervals.
 
     Args:
-        matrix_of: Function from one number per interval to the sampled matrix A.
+        loop_of: Function from one number per interval to the loop.
         intervals: Interval of each argument. An interval with equal ends is a constant.
         period_s: Sample period, s.
 
@@ -53,12 +99,12 @@ def interval_family(
     low, high = np.array(intervals).T
     vary = high > low
 
-    def of_varying(values: Vector) -> NDArray[np.float64]:
+    def of_varying(values: Vector) -> ClosedLoop:
         row = low.copy()
         row[vary] = values
-        return matrix_of(*row.tolist())
+        return loop_of(*row.tolist())
 
-    return Family(of_varying, period_s, low[vary], high[vary])
+    return MotionFamily(of_varying, period_s, low[vary], high[vary])
 
 
 def axis_family(
@@ -67,8 +113,10 @@ def axis_family(
     stiffness_n_m: Interval | None,
     damping_n_s_m: Interval,
     late_ticks: int = 0,
-) -> Family:
+) -> MotionFamily:
     """Returns the loops of the motion of P along one axis.
+
+    The loops are opened at the acceleration that the springs and dampers command.
 
     Args:
         scenario: Scenario with the mass, the motor lag, and the control period.
@@ -83,12 +131,17 @@ def axis_family(
     """
     period = scenario.tick_s
 
-    def matrix_of(
+    def loop_of(
         mass: float, lag: float, damping: float, stiffness: float
-    ) -> NDArray[np.float64]:
+    ) -> ClosedLoop:
         of = SampledMass(mass, lag, period, late_ticks)
-        matrix = sampled_matrix(stiffness, damping, of)
-        return matrix if stiffness_n_m else matrix[1:, 1:]
+        A = sampled_matrix(stiffness, damping, of)
+        # A damper of M commands -v, the third state, as its acceleration.
+        B = (sampled_matrix(0.0, 0.0, of) - sampled_matrix(0.0, mass, of))[:, 2:3]
+        C = np.zeros((1, len(A)))
+        C[0, 2], C[0, -1 if late_ticks else 0] = damping / mass, stiffness / mass
+        first = 0 if stiffness_n_m else 1
+        return ClosedLoop(A[first:, first:], B[first:], C[:, first:])
 
     intervals = [
         of_box(box, "robot.mass_kg", scenario.only.robot.mass_kg),
@@ -96,7 +149,7 @@ def axis_family(
         damping_n_s_m,
         stiffness_n_m or (0.0, 0.0),
     ]
-    return interval_family(matrix_of, intervals, period)
+    return interval_family(loop_of, intervals, period)
 
 
 def of_box(box: Box, name: str, nominal: float) -> Interval:
@@ -124,7 +177,7 @@ def contact_families(scenario: Scenario) -> BoxFamilies:
     """Returns a function from a box to the loops of the motion toward an obstacle."""
     own = scenario.follower.attraction
 
-    def families(box: Box) -> Sequence[Family]:
+    def families(box: Box) -> Sequence[MotionFamily]:
         spring = of_box(box, "attraction.stiffness_n_m", own.stiffness_n_m)
         stiffness = times(
             box["wheel_radius_share"], plus(spring, box["law_stiffness_n_m"])
@@ -148,7 +201,7 @@ def following_families(at: OperatingPoint) -> BoxFamilies:
     own = scenario.follower.attraction
     directions = _PrincipalStiffness(at)
 
-    def families(box: Box) -> Sequence[Family]:
+    def families(box: Box) -> Sequence[MotionFamily]:
         springs = of_box(box, "attraction.stiffness_n_m", own.stiffness_n_m)
         speeds = of_box(box, "sound_speed_m_s", scenario.sound_speed_m_s)
         slopes = sorted(range_slope(scenario, speed) for speed in speeds)

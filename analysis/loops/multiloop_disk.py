@@ -26,6 +26,7 @@ from scipy.optimize import minimize, minimize_scalar
 from analysis.loops.frequency_levels import frequency_grid
 from analysis.loops.linear_models import LinearModel
 from analysis.loops.margin_results import DiskMargin
+from analysis.loops.response_margins import nyquist_stable, refuse_gaps
 from systems.framework.input_error import InputError
 
 #: Number of frequencies at which mu is computed first.
@@ -70,11 +71,7 @@ def multiloop_disk_margin(model: LinearModel, skew: float = 0.0) -> MultiloopDis
     """
     n = model.B.shape[1]
     if model.C.shape[0] != n or n == 0:
-        raise InputError(
-            model.name,
-            f"has {n} inputs and {model.C.shape[0]} outputs; a multi-loop margin needs "
-            "as many outputs as inputs",
-        )
+        raise _not_square(model.name, n, model.C.shape[0])
     sensitivity = _sensitivity(model)
     if not sensitivity.stable:
         return MultiloopDiskMargin(skew, 0.0, math.nan, 0.0)
@@ -86,18 +83,10 @@ def multiloop_disk_margin(model: LinearModel, skew: float = 0.0) -> MultiloopDis
     def at(w: float) -> NDArray[np.complex128]:
         return np.asarray(sensitivity.response([w])[:, :, 0] + offset)
 
-    # A quick bound shows at which frequencies the best scaling can matter.
     matrices = np.moveaxis(sensitivity.response(omega), -1, 0) + offset
-    quick = np.array([_balanced(M)[0] for M in matrices])
-    best, where, peaks = 0.0, 0.0, []
-    for k in np.argsort(-quick):
-        if quick[k] <= best:
-            break
-        value = mu_upper(matrices[k])
-        peaks.append((value, int(k)))
-        if value > best:
-            best, where = value, float(omega[k])
-    for _, k in sorted(peaks, reverse=True)[:_PEAKS]:
+    peaks = _peaks(matrices)
+    best, where = peaks[0][0], float(omega[peaks[0][1]])
+    for _, k in peaks[:_PEAKS]:
         low, high = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
         found = minimize_scalar(
             lambda w: -mu_upper(at(float(w))),
@@ -112,11 +101,77 @@ def multiloop_disk_margin(model: LinearModel, skew: float = 0.0) -> MultiloopDis
     if not T and (last := mu_upper(highest)) > best:
         best, where = last, math.inf
     lower = mu_lower(highest if where == math.inf else at(where))
+    return _margin(skew, best, where, lower)
+
+
+def samples_disk_margin(
+    omega: NDArray[np.float64],
+    L: NDArray[np.complex128],
+    skew: float,
+    unstable_poles: int,
+) -> MultiloopDiskMargin:
+    """Computes the disk margin of several loops at the frequencies of a response.
+
+    The closed loop is stable if det(I + L) turns about 0 as the Nyquist criterion asks.
+
+    Args:
+        omega: (k,) ascending frequencies, rad/s.
+        L: (n, n, k) values of L.
+        skew: Skew of the disk, -1 to 1.
+        unstable_poles: Number of growing poles of L.
+
+    Returns:
+        The disk margin, as of ``multiloop_disk_margin``.
+
+    Raises:
+        InputError: L is not square, or does not decide whether the loop is stable.
+    """
+    n = len(L)
+    if L.shape[1] != n:
+        raise _not_square("loop", L.shape[1], n)
+    back = np.eye(n) + np.moveaxis(L, -1, 0)
+    turning = np.linalg.det(back)
+    refuse_gaps(omega, turning)
+    if not nyquist_stable(omega, turning - 1.0, unstable_poles):
+        return MultiloopDiskMargin(skew, 0.0, math.nan, 0.0)
+    matrices = np.asarray(np.linalg.inv(back) + (skew - 1.0) / 2.0 * np.eye(n), complex)
+    (best, k), *_ = _peaks(matrices)
+    return _margin(skew, best, float(omega[k]), mu_lower(matrices[k]))
+
+
+def _peaks(matrices: NDArray[np.complex128]) -> list[tuple[float, int]]:
+    """Largest bounds of mu with their positions, in falling order.
+
+    A quick bound shows at which frequencies the best scaling can matter.
+    """
+    quick = np.array([_balanced(M)[0] for M in matrices])
+    best, peaks = -1.0, []
+    for k in np.argsort(-quick):
+        if quick[k] <= best:
+            break
+        value = mu_upper(matrices[k])
+        peaks.append((value, int(k)))
+        best = max(best, value)
+    return sorted(peaks, reverse=True)
+
+
+def _margin(
+    skew: float, best: float, where: float, lower: float
+) -> MultiloopDiskMargin:
+    """Disk margin from the bounds of mu and the frequency of the upper one."""
     return MultiloopDiskMargin(
         skew,
         1.0 / best if best > 0.0 else math.inf,
         where,
         1.0 / lower if lower > 0.0 else math.inf,
+    )
+
+
+def _not_square(name: str, inputs: int, outputs: int) -> InputError:
+    return InputError(
+        name,
+        f"has {inputs} inputs and {outputs} outputs; a multi-loop margin needs as many "
+        "outputs as inputs",
     )
 
 

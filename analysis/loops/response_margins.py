@@ -29,6 +29,8 @@ from systems.framework.input_error import InputError
 
 #: Largest change of the phase of L between two points of measured data, rad.
 _LARGEST_TURN = math.pi / 2.0
+#: Smallest number of frequencies of measured data.
+_FEWEST = 4
 #: |L| below which the response counts as zero at the end of the frequencies.
 _END = 0.5
 #: Largest distance of the phase at the first frequency from that of its asymptote, rad.
@@ -80,23 +82,64 @@ def measured_response(
         InputError: The data have several inputs or outputs, are not finite, or do not
             decide whether the closed loop is stable.
     """
-    values = np.asarray(data.frdata)
+    omega, values = measured_samples(data)
     if values.shape[:2] != (1, 1):
         raise InputError(
             "loop",
-            f"has {values.shape[1]} inputs and {values.shape[0]} outputs; margins of a "
-            "frequency response need one of each",
+            f"has {values.shape[1]} inputs and {values.shape[0]} outputs; choose one "
+            "of each, for example loop[0, 0]",
         )
+    L = values[0, 0]
+    if not np.abs(L).min() > 0.0:
+        raise InputError("loop", "is 0 at a frequency; leave this frequency out")
+    refuse_gaps(omega, L)
+    logarithm = np.log(np.abs(L)) + 1j * np.unwrap(np.angle(L))
+    real = PchipInterpolator(np.log(omega), logarithm.real)
+    phase = PchipInterpolator(np.log(omega), logarithm.imag)
+
+    def at(w: NDArray[np.float64]) -> NDArray[np.complex128]:
+        x = np.log(w)
+        return np.asarray(np.exp(real(x) + 1j * (phase(x) - w * delay_s)))
+
+    turning = turning_grid(_end(omega, np.abs(L), _SMALL), delay_s)
+    turning = turning[(turning > omega[0]) & (turning < omega[-1])]
+    even = np.geomspace(omega[0], omega[-1], 5_000)
+    dense = np.unique(np.concatenate([omega, even, turning]))
+    response = LoopResponse(getattr(data, "name", None) or "loop", dense, at)
+    return response, nyquist_stable(dense, at(dense), unstable_poles)
+
+
+def measured_samples(
+    data: Any,
+) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Reads a ``control.FrequencyResponseData``.
+
+    Returns (k,) ascending frequencies above 0, rad/s, and the (p, m, k) values. Raises
+    InputError if there are too few, or if values are not finite.
+    """
     order = np.argsort(data.omega)
+    order = order[np.asarray(data.omega)[order] > 0.0]
     omega = np.asarray(data.omega, dtype=float)[order]
-    L = values[0, 0, order] * np.exp(-1j * omega * delay_s)
-    usable = omega > 0.0
-    omega, L = omega[usable], L[usable]
-    if len(omega) < 4 or not np.isfinite(L).all() or not np.abs(L).min() > 0.0:
+    L = np.asarray(data.frdata)[:, :, order].astype(complex)
+    if len(omega) < _FEWEST or not np.isfinite(L).all():
         raise InputError(
             "loop",
-            "needs at least four frequencies above 0, with finite values other than 0",
+            f"needs at least {_FEWEST} frequencies above 0, with finite values",
         )
+    return omega, L
+
+
+def response_period(data: Any) -> float | None:
+    """Period of a sampled frequency response, s; None if it is continuous."""
+    if data.dt is True:
+        raise InputError(
+            "loop", "is sampled with an unknown period (dt=True); state dt in s"
+        )
+    return float(data.dt) if data.dt else None
+
+
+def refuse_gaps(omega: NDArray[np.float64], L: NDArray[np.complex128]) -> None:
+    """Raises InputError if the phase of (k,) values L turns too far between two."""
     turns = np.abs(np.angle(L[1:] / L[:-1]))
     if turns.max() > _LARGEST_TURN:
         k = int(turns.argmax())
@@ -105,17 +148,6 @@ def measured_response(
             f"turns by {math.degrees(turns[k]):.0f} deg from {omega[k]:.4g} to "
             f"{omega[k + 1]:.4g} rad/s; give more points there",
         )
-    logarithm = np.log(np.abs(L)) + 1j * np.unwrap(np.angle(L))
-    real = PchipInterpolator(np.log(omega), logarithm.real)
-    phase = PchipInterpolator(np.log(omega), logarithm.imag)
-
-    def at(w: NDArray[np.float64]) -> NDArray[np.complex128]:
-        x = np.log(w)
-        return np.asarray(np.exp(real(x) + 1j * phase(x)))
-
-    dense = np.unique(np.concatenate([omega, np.geomspace(omega[0], omega[-1], 5_000)]))
-    response = LoopResponse(getattr(data, "name", None) or "loop", dense, at)
-    return response, nyquist_stable(dense, at(dense), unstable_poles)
 
 
 def nyquist_stable(
@@ -172,9 +204,24 @@ def delayed_response(model: LinearModel, delay_s: float) -> tuple[LoopResponse, 
 
     coarse = frequency_grid(model.poles, None)
     size = np.abs(model.response(coarse)[0, 0])
-    limit = max(_SMALL, 1.01 * top)
-    last = int(np.flatnonzero(size > limit).max(initial=0))
-    end = float(coarse[min(last + 1, len(coarse) - 1)])
+    end = _end(coarse, size, max(_SMALL, 1.01 * top))
+    omega = np.unique(
+        np.concatenate([coarse[coarse <= end], turning_grid(end, delay_s)])
+    )
+    return LoopResponse(model.name, omega, at), stable_with_delay(model, delay_s)
+
+
+def _end(omega: NDArray[np.float64], size: NDArray[np.float64], least: float) -> float:
+    """Frequency beyond which (k,) sizes stay below a limit, rad/s."""
+    last = int(np.flatnonzero(size > least).max(initial=0))
+    return float(omega[min(last + 1, len(omega) - 1)])
+
+
+def turning_grid(end: float, delay_s: float) -> NDArray[np.float64]:
+    """Frequencies up to ``end``, rad/s, between which a delay turns by little.
+
+    Raises InputError if these are too many.
+    """
     count = max(2, math.ceil(end * delay_s * _PER_RADIAN))
     if count > _MOST_POINTS:
         raise InputError(
@@ -182,10 +229,7 @@ def delayed_response(model: LinearModel, delay_s: float) -> tuple[LoopResponse, 
             f"is {delay_s:g} s, which turns the phase too often up to {end:.3g} rad/s, "
             "where the loop still acts; state a shorter delay",
         )
-    omega = np.unique(
-        np.concatenate([coarse[coarse <= end], np.linspace(0.0, end, count)[1:]])
-    )
-    return LoopResponse(model.name, omega, at), stable_with_delay(model, delay_s)
+    return np.linspace(0.0, end, count)[1:]
 
 
 def stable_with_delay(model: LinearModel, delay_s: float) -> bool:
@@ -222,26 +266,7 @@ def response_margins(response: LoopResponse, *, stable: bool) -> LoopMargins:
     lag, lead, where, delay, late = phases_at(
         at, response.at(np.array(at)) if at else ()
     )
-
-    def least(skew: float) -> tuple[float, float]:
-        """Smallest 1/|S + (skew - 1)/2|, and its frequency."""
-
-        def size(w: Any) -> Any:
-            S = 1.0 / (1.0 + response.at(np.atleast_1d(w)))
-            return np.abs(S + (skew - 1.0) / 2.0)
-
-        values = size(omega)
-        best, at = float(values.max()), float(omega[int(values.argmax())])
-        for k in np.argsort(values)[-_PEAKS:]:
-            low, high = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
-            found = minimize_scalar(
-                lambda w: -float(size(w)[0]), bounds=(low, high), method="bounded"
-            )
-            if -found.fun > best:
-                best, at = float(-found.fun), float(found.x)
-        return 1.0 / best, at
-
-    disks = tuple(DiskMargin(skew, *least(skew)) for skew in SKEWS)
+    disks = tuple(response_disk(response, skew) for skew in SKEWS)
     modulus = disks[SKEWS.index(1.0)]
     complementary = disks[SKEWS.index(-1.0)]
     return LoopMargins(
@@ -261,3 +286,23 @@ def response_margins(response: LoopResponse, *, stable: bool) -> LoopMargins:
         complementary_peak=1.0 / complementary.alpha,
         disks=disks,
     )
+
+
+def response_disk(response: LoopResponse, skew: float) -> DiskMargin:
+    """Computes the disk margin of a stable loop: the least 1/|S + (skew - 1)/2|."""
+    omega = response.omega
+
+    def size(w: Any) -> Any:
+        S = 1.0 / (1.0 + response.at(np.atleast_1d(w)))
+        return np.abs(S + (skew - 1.0) / 2.0)
+
+    values = size(omega)
+    best, at = float(values.max()), float(omega[int(values.argmax())])
+    for k in np.argsort(values)[-_PEAKS:]:
+        low, high = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
+        found = minimize_scalar(
+            lambda w: -float(size(w)[0]), bounds=(low, high), method="bounded"
+        )
+        if -found.fun > best:
+            best, at = float(-found.fun), float(found.x)
+    return DiskMargin(skew, 1.0 / best, at)

@@ -288,10 +288,15 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
         # damper or lag.
         *(within_share(*row) for row in shares if row[3] > 0.0),
         WHEEL_RADIUS,
-        UncertainParameter(
-            "extra_ticks", "latency", f"{scenario.tick_s * 1e3:g} ms", 0.0, 0.0, 1.0,
-            "a processor that needs one more tick; whole ticks", whole=True,
-        ),
+        extra_tick(scenario),
+    )
+
+
+def extra_tick(scenario: Scenario) -> UncertainParameter:
+    """Returns the uncertain latency of one tick."""
+    return UncertainParameter(
+        "extra_ticks", "latency", f"{scenario.tick_s * 1e3:g} ms", 0.0, 0.0, 1.0,
+        "a processor that needs one more tick; whole ticks", whole=True,
     )  # fmt: skip
 
 

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.loops.parameter_polynomial import ParameterPolynomial, halves
+from analysis.loops.parameter_polynomial import halves
 
 #: Number of parts at each level at which the search looks for a counterexample.
 _TRIALS = 12
@@ -43,7 +43,8 @@ class Exclusion:
 
 
 def exclude_zeros(
-    polynomial: ParameterPolynomial,
+    control: NDArray[Any],
+    error: Vector,
     boundary: Complex,
     violates: Callable[[Vector], bool],
     most_parts: int,
@@ -51,7 +52,9 @@ def exclude_zeros(
     """Searches for zeros of a polynomial on a boundary, for all parameters of a box.
 
     Args:
-        polynomial: Coefficients of the polynomial, highest power first.
+        control: (d_1 + 1, ..., d_p + 1, n) Bernstein coefficients over the box of the
+            coefficients of the polynomial, highest power first.
+        error: (n,) bound of the error of these coefficients of the polynomial.
         boundary: (n, n) matrix from these coefficients to Bernstein coefficients along
             the boundary; see ``homogeneous``.
         violates: Whether a point of the box, as (p,) shares, is a counterexample.
@@ -60,9 +63,9 @@ def exclude_zeros(
     Returns:
         Whether there is no zero.
     """
-    values: Complex = polynomial.control @ boundary.T
-    allowed: Vector = np.abs(boundary) @ polynomial.error
-    shape, count = values.shape, len(polynomial.axes)
+    values: Complex = control @ boundary.T
+    allowed: Vector = np.abs(boundary) @ error
+    shape, count = values.shape, values.ndim - 1
     parts, errors = values.reshape(1, -1), allowed[None]
     low, high = np.zeros((1, count)), np.ones((1, count))
     examined = 0

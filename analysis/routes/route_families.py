@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from analysis.loops.growth_bound import Family
 from analysis.loops.motion_families import (
     Box,
     BoxFamilies,
+    ClosedLoop,
     Interval,
+    MotionFamily,
     axis_family,
     interval_family,
     of_box,
@@ -81,10 +82,10 @@ def route_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     return tuple(found)
 
 
-def lateral_matrix(
+def lateral_loop(
     scenario: Scenario, mass: float, lag: float, damping: float, stiffness: float
-) -> NDArray[np.float64]:
-    """Computes the matrix A of the motion across a straight route over one period.
+) -> ClosedLoop:
+    """Computes the loop of the motion across a straight route over one period.
 
     The robot drives at the speed V of the target. Its axle is at y across the route, P
     is at y + e theta, and the yaw rate w follows its command u with the lag::
@@ -101,7 +102,8 @@ def lateral_matrix(
         stiffness: Stiffness K, N/m.
 
     Returns:
-        (4, 4) matrix A. The state is y, theta, w, v.
+        The loop, with the feedback at the acceleration of the law. Its four states are
+        y, theta, w, v.
     """
     period, speed = scenario.tick_s, scenario.router.route.speed_m_s
     ahead = scenario.only.robot.control_point_m
@@ -116,7 +118,9 @@ def lateral_matrix(
     A = np.outer(held[:, 3], command)
     A[:3, :3] += held[:3, :3]
     A[3] = v
-    return A
+    B = period * np.append(held[:3, 3] / ahead, 1.0)[:, None]
+    C = np.array([[stiffness, stiffness * ahead, 0.0, damping]]) / mass
+    return ClosedLoop(A, B, C)
 
 
 def route_families(scenario: Scenario) -> BoxFamilies:
@@ -135,7 +139,7 @@ def route_families(scenario: Scenario) -> BoxFamilies:
         )
     mass, lag = scenario.only.robot.mass_kg, scenario.only.plant.motor_lag_s
 
-    def families(box: Box) -> Sequence[Family]:
+    def families(box: Box) -> Sequence[MotionFamily]:
         spring = of_box(box, "impedance.stiffness_n_m", own.stiffness_n_m)
         damper = of_box(box, "impedance.damping_n_s_m", own.damping_n_s_m)
         masses = of_box(box, "robot.mass_kg", mass)
@@ -143,7 +147,7 @@ def route_families(scenario: Scenario) -> BoxFamilies:
         found = [
             axis_family(scenario, box, spring, damper),
             interval_family(
-                partial(lateral_matrix, scenario),
+                partial(lateral_loop, scenario),
                 [masses, lags, damper, spring],
                 scenario.tick_s,
             ),

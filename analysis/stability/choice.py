@@ -39,17 +39,30 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
                     "leave --law out",
                 )
             continue
+        if plans(law):
+            if set(laws or [law]) != {law}:
+                raise InputError(
+                    "law",
+                    f"{law!r} has other sections than laws that compute a force; "
+                    f"analyze it alone: --law {law}",
+                )
+            continue
         if not routed and law in LAWS and law not in FORCE_LAWS:
             raise InputError(
                 "law",
-                f"{law!r} plans and decides, so that it has no linear model; use "
-                f"{', '.join(every)}, and add --guard on to include the promises of "
-                "the guard",
+                f"{law!r} decides anew in each tick, so that it has no linear model; "
+                f"use guarded, {', '.join(every)}, and add --guard on to include the "
+                "promises of the guard",
             )
     return tuple(
         scenario_from_mapping({**scenario.model_dump(), "law": law})
         for law in dict.fromkeys(laws or [scenario.only.law])
     )
+
+
+def plans(law: str) -> bool:
+    """Whether a law is the guarded law, which commands motions along a way."""
+    return law in LAWS and LAWS[law].guarded
 
 
 def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:

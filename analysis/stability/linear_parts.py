@@ -79,6 +79,27 @@ class LinearModels:
     gradient: GradientCheck
     """Comparison of AutoDiff with finite differences."""
 
+    @property
+    def difference_error(self) -> float | None:
+        """Estimated error of an element of A if some derivatives are differences.
+
+        It is the deviation of differences of single laws and blocks from differences of
+        the whole diagram with another step. None if Drake differentiates all blocks.
+        """
+        return self.gradient.largest_difference if self.at.loop.differences() else None
+
+
+def _model_notes(data: LinearModels) -> list[str]:
+    error = data.difference_error
+    if error is None:
+        return []
+    text = (
+        f"The error of the differences is estimated as at most {error:.1e} in an "
+        "element of the sampled model. This is the largest deviation from differences "
+        "of the whole diagram with another step."
+    )
+    return [text]
+
 
 def _operating_points(study: Study) -> OperatingPoints:
     scenario = study.scenario
@@ -201,6 +222,7 @@ def _models_document(data: LinearModels) -> dict[str, Any]:
         "sampled": pick(data.sampled, *names),
         "routes": data.routes,
         "gradient": data.gradient,
+        "difference_error": data.difference_error,
     }
 
 
@@ -217,7 +239,11 @@ def _show_models(data: LinearModels) -> list[Content]:
         ],
         ["poles of the two computations", "simple, nonzero", routes.pole_difference],
         [
-            "AutoDiff against central differences",
+            (
+                "AutoDiff against central differences"
+                if data.difference_error is None
+                else "differences of laws and blocks against those of the diagram"
+            ),
             ", ".join(f"`{x}`" for x in check.largest_at),
             check.largest_difference,
         ],
@@ -384,6 +410,7 @@ LINEAR_MODELS = Part[LinearModels](
     ),
     document=_models_document,
     models=lambda data: (data.continuous, data.sampled, data.at.motion),
+    notes=_model_notes,
 )  # fmt: skip
 
 #: A small step, predicted by the linear model and simulated.

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from analysis.report.provenance import versions
+from analysis.stability.choice import plans
 from diagrams import Scenario, dump_scenario
 from diagrams.scenario.participants import Follower, Router
 from systems.framework.meanings import meanings
@@ -41,6 +42,10 @@ _OTHERS = frozenset(
 #: The field that selects which speed of an obstacle the law uses: ``printed`` or
 #: ``closing``.
 _VELOCITY_TERM = "collision_vector.velocity_term"
+#: Fields that have no effect on the guarded law.
+_NOT_GUARDED = frozenset(
+    {"attraction.stiffness_n_m", "attraction.damping_n_s_m", _VELOCITY_TERM}
+)
 
 #: Conventions that hold for every law.
 _CONVENTIONS = (
@@ -84,6 +89,14 @@ _ROUTE_ASSUMPTIONS = (
         "limits."
     ),
     "No linear model includes the planner, the safety filter or the adaptation.",
+)
+_DRIVE_ASSUMPTIONS = (
+    *_CONVENTIONS[:2],
+    (
+        "Linear models describe the law on free floor, with the motor lag and exact "
+        "sensors. They are valid while speed and yaw rate stay below their limits."
+    ),
+    "No linear model includes the map, the planner, weaving, looks or the guard.",
 )
 
 
@@ -185,6 +198,9 @@ def model_sheet(scenario: Scenario) -> ModelSheet:
     elif routed:
         motion, assumptions = _route_motion(scenario.tick_s), _ROUTE_ASSUMPTIONS
         envelope, latencies = _route_envelope(scenario), _route_latencies(scenario)
+    elif plans(scenario.only.law):
+        motion, assumptions = (), _DRIVE_ASSUMPTIONS
+        envelope, latencies = _envelope(scenario), _latencies(scenario)
     else:
         motion, assumptions = _motion(scenario.tick_s), _ASSUMPTIONS
         envelope, latencies = _envelope(scenario), _latencies(scenario)
@@ -213,8 +229,9 @@ def _parameters(scenario: Scenario) -> Iterator[ParameterRow]:
         if robot.gains is not None:
             groups[f"laws.{robot.law}."] = robot.gains
         groups["sound."] = scenario.source.sound
+    others = _OTHERS | _NOT_GUARDED if plans(robot.law) else _OTHERS
     for prefix, group in groups.items():
-        yield from (row for row in _rows(group, prefix) if row.field not in _OTHERS)
+        yield from (row for row in _rows(group, prefix) if row.field not in others)
     if isinstance(robot, Router):
         for row in _rows(robot.gains, ""):
             shared = row.field in ImpedanceParameters.model_fields

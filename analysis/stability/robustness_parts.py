@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from analysis.loops.drive_families import (
+    drive_families,
+    drive_poles,
+    drive_uncertainty,
+)
 from analysis.loops.heading_families import (
     heading_families,
     heading_poles,
@@ -100,50 +106,6 @@ def loop_robustness(
     return LoopRobustness(cloud, sensitivities, bound)
 
 
-def _following(study: Study) -> LoopRobustness:
-    at = study.need("equilibria").at
-    return loop_robustness(
-        study.scenario,
-        following_poles(at),
-        following_families(at),
-        following_uncertainty(study.scenario),
-        samples=_SAMPLES[study.full],
-    )
-
-
-def _before_an_obstacle(study: Study) -> LoopRobustness:
-    return loop_robustness(
-        study.scenario,
-        contact_poles(study.scenario),
-        contact_families(study.scenario),
-        contact_uncertainty(study.scenario),
-        samples=4 * _SAMPLES[study.full],
-    )
-
-
-def _on_a_route(study: Study) -> LoopRobustness:
-    scenario = study.scenario
-    return loop_robustness(
-        scenario,
-        route_poles(scenario),
-        route_families(scenario),
-        route_uncertainty(scenario),
-        samples=4 * _SAMPLES[study.full],
-        known_error_per_s=nominal_difference(scenario, study.need("frozen_gains")),
-    )
-
-
-def _of_the_heading(study: Study) -> LoopRobustness:
-    scenario = study.scenario
-    return loop_robustness(
-        scenario,
-        heading_poles(scenario),
-        heading_families(scenario),
-        heading_uncertainty(scenario),
-        samples=4 * _SAMPLES[study.full],
-    )
-
-
 def _document(data: LoopRobustness) -> dict[str, Any]:
     """Returns everything except the poles of each sample."""
     return {
@@ -182,12 +144,21 @@ def bound_text(bound: LoopBound | str, found_per_s: float) -> str:
             f"differ by at most {number(bound.model_error_per_s, 2)} 1/s, and the "
             "bound allows for ten times this difference."
         )
+    margins = ""
+    if bound.disk_margin.found > 0.0:
+        disk, delay = bound.disk_margin, bound.delay_margin_s
+        margins = (
+            " With the loop opened at the signal that its controller commands, the "
+            f"disk margin is proven to be at least {number(disk.proven, 4)} (found "
+            f"{number(disk.found, 4)}), and the delay margin at least "
+            f"{number(delay.proven, 4)} s (found {number(delay.found, 4)} s)."
+        )
     return (
         f"It is proven that no values in the ranges have a growth rate above "
         f"{number(proven, 5)} 1/s. The worst case found has {number(found_per_s, 5)} "
         f"1/s, so that the gap is {number(100.0 * gap, 2)} %. {scale} The proof is "
         f"by zero exclusion with Bernstein coefficients, with {bound.parts} parts in "
-        f"{number(bound.computing_time_s, 2)} s.{reduced}"
+        f"{number(bound.computing_time_s, 2)} s.{reduced}{margins}"
     )
 
 
@@ -240,70 +211,131 @@ def _show(data: LoopRobustness) -> list[Content]:
     ]
 
 
-ROBUSTNESS = Part[LoopRobustness](
+def _part(
+    key: str,
+    title: str,
+    compute: Callable[[Study], LoopRobustness],
+    growth: str,
+    good: str,
+    bad: str,
+) -> Part[LoopRobustness]:
+    """Part about one loop. ``growth`` names its growth rate in the summary."""
+    return Part[LoopRobustness](
+        key,
+        title,
+        compute,
+        _show,
+        criteria=(
+            Criterion(
+                f"{growth}, worst parameters", "1/s", "below", 0.0, good, bad,
+                "stability over the ranges of all parameters",
+                lambda data: data.growth_per_s,
+            ),
+        ),
+        document=_document,
+    )  # fmt: skip
+
+
+def _following(study: Study) -> LoopRobustness:
+    at = study.need("equilibria").at
+    return loop_robustness(
+        study.scenario,
+        following_poles(at),
+        following_families(at),
+        following_uncertainty(study.scenario),
+        samples=_SAMPLES[study.full],
+    )
+
+
+ROBUSTNESS = _part(
     "robustness",
     "Robustness at the operating point",
     _following,
-    _show,
-    criteria=(
-        Criterion(
-            "growth at rest, worst parameters", "1/s", "below", 0.0,
-            "it stays stable for all parameters in their ranges",
-            "some parameters in their ranges make it unstable",
-            "stability over the ranges of all parameters",
-            lambda data: data.growth_per_s,
-        ),
-    ),
-    document=_document,
-)  # fmt: skip
+    "growth at rest",
+    "it stays stable for all parameters in their ranges",
+    "some parameters in their ranges make it unstable",
+)
 
-CONTACT_ROBUSTNESS = Part[LoopRobustness](
+
+def _before_an_obstacle(study: Study) -> LoopRobustness:
+    return loop_robustness(
+        study.scenario,
+        contact_poles(study.scenario),
+        contact_families(study.scenario),
+        contact_uncertainty(study.scenario),
+        samples=4 * _SAMPLES[study.full],
+    )
+
+
+CONTACT_ROBUSTNESS = _part(
     "contact_robustness",
     "Robustness before an obstacle",
     _before_an_obstacle,
-    _show,
-    criteria=(
-        Criterion(
-            "growth before an obstacle, worst parameters", "1/s", "below", 0.0,
-            "it comes to rest before an obstacle for all parameters in their ranges",
-            "some parameters in their ranges make it swing where the law is stiffest",
-            "stability over the ranges of all parameters",
-            lambda data: data.growth_per_s,
-        ),
-    ),
-    document=_document,
-)  # fmt: skip
+    "growth before an obstacle",
+    "it comes to rest before an obstacle for all parameters in their ranges",
+    "some parameters in their ranges make it swing where the law is stiffest",
+)
 
-ROUTE_ROBUSTNESS = Part[LoopRobustness](
+
+def _on_a_route(study: Study) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        route_poles(scenario),
+        route_families(scenario),
+        route_uncertainty(scenario),
+        samples=4 * _SAMPLES[study.full],
+        known_error_per_s=nominal_difference(scenario, study.need("frozen_gains")),
+    )
+
+
+ROUTE_ROBUSTNESS = _part(
     "route_robustness",
     "Robustness on the route and before a wall",
     _on_a_route,
-    _show,
-    criteria=(
-        Criterion(
-            "growth with frozen gains, worst parameters", "1/s", "below", 0.0,
-            "small deviations die out for all parameters in their ranges",
-            "small deviations grow for some parameters in their ranges",
-            "stability over the ranges of all parameters",
-            lambda data: data.growth_per_s,
-        ),
-    ),
-    document=_document,
-)  # fmt: skip
+    "growth with frozen gains",
+    "small deviations die out for all parameters in their ranges",
+    "small deviations grow for some parameters in their ranges",
+)
 
-HEADING_ROBUSTNESS = Part[LoopRobustness](
+
+def _of_the_heading(study: Study) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        heading_poles(scenario),
+        heading_families(scenario),
+        heading_uncertainty(scenario),
+        samples=4 * _SAMPLES[study.full],
+    )
+
+
+HEADING_ROBUSTNESS = _part(
     "heading_robustness",
     "Robustness of the heading",
     _of_the_heading,
-    _show,
-    criteria=(
-        Criterion(
-            "growth of the heading, worst parameters", "1/s", "below", 0.0,
-            "it turns to its heading for all parameters in their ranges",
-            "some parameters in their ranges make it swing about its heading",
-            "stability over the ranges of all parameters",
-            lambda data: data.growth_per_s,
-        ),
-    ),
-    document=_document,
-)  # fmt: skip
+    "growth of the heading",
+    "it turns to its heading for all parameters in their ranges",
+    "some parameters in their ranges make it swing about its heading",
+)
+
+
+def _on_free_floor(study: Study) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        drive_poles(scenario),
+        drive_families(scenario),
+        drive_uncertainty(scenario),
+        samples=4 * _SAMPLES[study.full],
+    )
+
+
+DRIVE_ROBUSTNESS = _part(
+    "drive_robustness",
+    "Robustness on free floor",
+    _on_free_floor,
+    "growth on free floor",
+    "it follows its way for all parameters in their ranges",
+    "some parameters in their ranges make it swing on free floor",
+)

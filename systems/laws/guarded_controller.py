@@ -141,7 +141,7 @@ class GuardedController(Block):
             hazard_sensors(sensors, robot, tick_s),
             (0.5 * robot.length_m, 0.5 * robot.width_m),
             (narrow + margin, disc + margin),
-            max(CRUISE_SPEED_M_S, _CRUISE_SHARE * robot.top_speed_m_s),
+            cruise_speed(robot),
             tick_s,
         )
         state = make_drive_state(guard.cells_for(disc), sensors.count)
@@ -150,6 +150,11 @@ class GuardedController(Block):
             tick_s=tick_s,
             sizes={"sensors": sensors.count},
         )
+
+
+def cruise_speed(robot: RobotParameters) -> float:
+    """Computes the largest speed that the guarded law wants, m/s."""
+    return max(CRUISE_SPEED_M_S, _CRUISE_SHARE * robot.top_speed_m_s)
 
 
 def hazard_sensors(

@@ -21,7 +21,7 @@ _SOURCE_CLEARANCE_M = 0.85
 #: Time from one plan to the next, s.
 _REPLAN_S = 0.5
 #: Greatest distance to the point of the route toward which the robot drives, m.
-_LOOK_AHEAD_M = 1.5
+LOOK_AHEAD_M = 1.5
 #: A route is straight if its length is below this multiple of the direct distance.
 _DETOUR = 1.15
 # The robot has arrived if both of these values are below their limits.
@@ -85,7 +85,7 @@ def find_heading(
         m.planned_s[0] = time
         if way.dearest[0] < OCCUPIED:
             m.passable_s[0] = time
-    carrot = find_carrot(way, x, y, _LOOK_AHEAD_M)
+    carrot = find_carrot(way, x, y, LOOK_AHEAD_M)
     # Distance from P to the target, and from the axle.
     follow, offset = numbers.follow_distance_m, numbers.control_point_m
     dx = target[0] - x - offset * math.cos(theta)

@@ -126,11 +126,60 @@ def test_a_signal_that_changes_within_the_period_is_no_cut():
     assert loop.response([3.0])[0, 0, 0] == pytest.approx(expected)
 
 
+def test_each_function_opens_a_diagram_at_a_port():
+    # L = 3 / (s (0.5 s + 1)), as in the test above.
+    diagram = servo(inner=False)
+    at = {"context": diagram.CreateDefaultContext(), "port": "lag.u0"}
+    L = control.tf([3.0], [0.5, 1.0, 0.0])
+    crossover = math.sqrt(2.0 * (math.sqrt(10.0) - 1.0))  # w^2 (w^2/4 + 1) = 9
+    phase = math.pi / 2.0 - math.atan(0.5 * crossover)
+    found = phonotaxis.margins(diagram, **at)
+    assert found.phase_lag_margin_deg == pytest.approx(math.degrees(phase))
+    late = phonotaxis.margins(diagram, **at, delay_s=0.1)
+    expected = math.degrees(phase - 0.1 * crossover)
+    assert late.phase_lag_margin_deg == pytest.approx(expected)
+    delay = phonotaxis.delay_margin(diagram, **at)
+    assert delay.delay_s == pytest.approx(phase / crossover)
+    w = np.linspace(0.01, 20.0, 200_001)
+    for pause in (0.0, 0.1):
+        late_L = L(1j * w) * np.exp(-1j * w * pause)
+        nearest = np.abs((1.0 + late_L) / (1.0 - late_L)).min() * 2.0
+        disk = phonotaxis.disk_margin(diagram, **at, delay_s=pause)
+        assert disk.alpha == pytest.approx(nearest, rel=1e-6)
+    # A relay with hysteresis of half width 0.1: -1/N has the imaginary part
+    # -pi * 0.1 / 4, and L the imaginary part -3 / (w (1 + w^2/4)).
+    relay = control.relay_hysteresis_nonlinearity(1.0, 0.1)
+    (cycle,) = phonotaxis.describing_function(diagram, relay, **at).cycles
+    found_w = cycle.frequency_rad_s
+    assert 3.0 / (found_w * (1.0 + found_w**2 / 4.0)) == pytest.approx(
+        math.pi * 0.1 / 4.0
+    )
+    # Always closed, the map is that of the closed loop.
+    bursts = phonotaxis.burst_cycle(diagram, 0.5, 0.0, **at)
+    poles = np.roots([0.5, 1.0, 3.0])
+    assert bursts.largest == pytest.approx(np.exp(0.5 * poles.real).max())
+    family = phonotaxis.robustness(
+        lambda p: (p["a"] and diagram, at["context"]), {"a": (1.0, 2.0)}
+    )
+    assert family.growth_per_s == pytest.approx(poles.real.max())
+
+
 def test_refusals_name_the_remedy():
     with pytest.raises(InputError, match="is a ndarray; give a control"):
         phonotaxis.margins(np.eye(2))
     with pytest.raises(InputError, match="state dt in s"):
         phonotaxis.margins(control.tf([1.0], [1.0, 0.5], True))
+    with pytest.raises(InputError, match=r"port: is missing; .*port='block\.port'"):
+        phonotaxis.disk_margin(servo(inner=False))
+    with pytest.raises(InputError, match=r"context: is 0\.5, .*only with a Drake"):
+        phonotaxis.disk_margin(control.tf([1.0], [1.0, 1.0]), 0.5)
+    samples = control.frequency_response(control.tf([1.0], [1.0, 1.0]), [1.0, 2.0])
+    with pytest.raises(InputError, match="has no states; give a model"):
+        phonotaxis.burst_cycle(samples, 1.0, 1.0)
+    with pytest.raises(InputError, match="has no states; give a model"):
+        phonotaxis.robustness(lambda p: samples, {"a": (1.0, 2.0)})
+    with pytest.raises(InputError, match=r"port: is 'a\.b', but"):
+        phonotaxis.margins(samples, port="a.b")
     with pytest.raises(InputError, match="from -1 to 1"):
         phonotaxis.disk_margin(control.tf([1.0], [1.0, 1.0]), skew=3.0)
     builder = DiagramBuilder()

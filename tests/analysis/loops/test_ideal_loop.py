@@ -19,8 +19,13 @@ from analysis.loops.ideal_scenarios import (
     ideal_scenario,
     require_ideal,
 )
+from analysis.loops.linearization import check_gradient
 from analysis.loops.radial_law import radial_law
-from analysis.stability.linear_parts import OPERATING_POINTS
+from analysis.stability.linear_parts import (
+    LINEAR_MODELS,
+    OPERATING_POINTS,
+    LinearModels,
+)
 from diagrams import build_sound_follower, make_simulator
 from diagrams.scenario.scenario import Scenario
 from docs.building.page_code import page_file
@@ -247,6 +252,18 @@ def test_a_law_that_refuses_autodiff_is_linearized_by_differences(own_laws):
         for each in (loop, smooth)
     ]
     np.testing.assert_allclose(matrices[0], matrices[1], atol=1e-8)
+    # The report states an estimate of this error.
+    state, time_s = loop.settled_state(at)
+    point: Any = SimpleNamespace(loop=loop, state=state, time_s=time_s)
+    none: Any = None
+    found = LinearModels(point, none, none, none, check_gradient(point))
+    error = found.difference_error
+    assert error is not None
+    assert np.abs(matrices[0] - matrices[1]).max() <= error < 1e-5
+    (said,) = LINEAR_MODELS.notes(found)
+    assert f"is estimated as at most {error:.1e}" in said
+    point.loop = smooth
+    assert LINEAR_MODELS.notes(found) == []
 
 
 def test_a_law_block_of_floats_is_linearized_by_differences(own_laws):

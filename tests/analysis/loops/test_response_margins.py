@@ -126,3 +126,70 @@ def test_data_that_decide_nothing_are_refused():
         phonotaxis.margins(loop, delay_s=-1.0)
     with pytest.raises(InputError, match="infinite frequency"):
         phonotaxis.margins(control.tf([2.0, 1.0], [1.0, 3.0]), delay_s=0.1)
+
+
+TEXTBOOK = control.tf([25.0], [1.0, 10.0, 10.0, 10.0])
+# A rotation couples the channels; S then has other directions at each frequency.
+COUPLED = control.ss(
+    np.diag([-1.0, -0.2]), [[3.0, 1.0], [-0.2, 0.5]], [[1.0, 0.3], [-1.0, 1.0]], 0.0
+)
+
+
+@pytest.mark.parametrize("skew", [0.0, 1.0])
+@pytest.mark.parametrize(
+    ("loop", "delay"),
+    [
+        (TEXTBOOK, 0.0),
+        (TEXTBOOK, 0.1),
+        (COUPLED, 0.0),
+        (COUPLED.sample(0.1), 0.0),
+        (COUPLED.sample(0.1), 0.2),
+        (control.tf([2.0], [1.0, -1.0]), 0.1),
+    ],
+)
+def test_the_disk_margin_of_a_response_is_that_of_its_model(loop, delay, skew):
+    omega = OMEGA[math.pi / loop.dt > OMEGA] if loop.dt else OMEGA
+    data = control.frequency_response(loop, omega)
+    growing = int((loop.poles().real > 0.0).sum()) if not loop.dt else 0
+    found = phonotaxis.disk_margin(
+        data, skew=skew, delay_s=delay, unstable_poles=growing
+    )
+    exact = phonotaxis.disk_margin(loop, skew=skew, delay_s=delay)
+    assert 0.0 < exact.alpha < math.inf
+    assert found.alpha == pytest.approx(exact.alpha, rel=2e-3)
+    assert found.destabilizing_alpha == pytest.approx(found.alpha, rel=1e-5)
+
+
+def test_the_delay_margin_of_a_response():
+    # L = 2 / (s - 1): 60 deg of lag at sqrt(3) rad/s.
+    data = control.frequency_response(control.tf([2.0], [1.0, -1.0]), OMEGA)
+    found = phonotaxis.delay_margin(data, unstable_poles=1)
+    expected = math.radians(60.0) / math.sqrt(3.0)
+    assert found.delay_s == pytest.approx(expected, rel=1e-3)
+    with pytest.raises(InputError, match="unstable without a delay"):
+        phonotaxis.delay_margin(data)
+    # Levin and May (1976), as in test_given_delays.
+    omega = np.geomspace(1e-3, math.pi / 0.1 * 0.999, 400)
+    for gain in (0.05, 0.3, 0.9):
+        data = control.frequency_response(control.tf([gain], [1.0, -1.0], 0.1), omega)
+        limit = next(
+            d for d in range(100) if gain >= 2.0 * math.cos(d * math.pi / (2 * d + 1))
+        )
+        found = phonotaxis.delay_margin(data)
+        assert found.whole_periods
+        assert found.delay_s == pytest.approx(0.1 * limit)
+
+
+def test_several_loops_that_are_not_decided_are_refused():
+    data = control.frequency_response(COUPLED, OMEGA)
+    with pytest.raises(InputError, match="choose one of each"):
+        phonotaxis.delay_margin(data)
+    with pytest.raises(InputError, match="as many outputs as inputs"):
+        phonotaxis.disk_margin(data[:, 0])
+    with pytest.raises(InputError, match=r"give control\.frequency_response"):
+        phonotaxis.disk_margin(COUPLED, delay_s=0.1)
+    # Of a loop that turns too often, the closed loop is unstable.
+    assert phonotaxis.disk_margin(data, unstable_poles=1).alpha == 0.0
+    sampled = control.frequency_response(COUPLED.sample(0.1), OMEGA[OMEGA < 31.0])
+    with pytest.raises(InputError, match="multiple of the period"):
+        phonotaxis.disk_margin(sampled, delay_s=0.05)

@@ -14,10 +14,11 @@ from analysis.loops.heading_families import (
 )
 from analysis.loops.heading_loop import heading_loop_margins
 from analysis.loops.loop_bound import bound_loop
+from analysis.loops.loop_margins import loop_margins
 from analysis.loops.robustness import pole_cloud
 from analysis.routes.frozen_gains import frozen_gains
 from analysis.routes.route_families import (
-    lateral_matrix,
+    lateral_loop,
     nominal_difference,
     route_families,
     route_poles,
@@ -37,7 +38,7 @@ def test_reduced_loops_are_those_of_the_blocks(filtered):
     assert nominal_difference(filtered, points) < 1e-5
     # On the route, the block model has the poles along and across the route.
     own, of = filtered.router.gains, filtered.only
-    across = lateral_matrix(
+    across = lateral_loop(
         filtered,
         of.robot.mass_kg,
         of.plant.motor_lag_s,
@@ -45,8 +46,24 @@ def test_reduced_loops_are_those_of_the_blocks(filtered):
         own.stiffness_n_m,
     )
     (driving,) = (point for point in points if point.at.speed_m_s)
-    for pole in np.linalg.eigvals(across):
+    for pole in np.linalg.eigvals(across.A):
         assert np.abs(driving.model.poles - pole).min() < 1e-6
+
+
+def test_reduced_loops_have_the_margins_of_the_blocks(filtered):
+    nominal = {p.name: (p.nominal, p.nominal) for p in route_uncertainty(filtered)}
+    rest, lateral, *_ = route_families(filtered)(nominal)
+    for point in frozen_gains(filtered):
+        if point.at.wall_m is not None:
+            continue
+        across = lateral if point.at.speed_m_s else rest
+        for axis, family in (("along", rest), ("across", across)):
+            found = loop_margins(family.opened.model_of(np.empty(0)))
+            blocks = point.margins[axis]
+            assert found.disk.alpha == pytest.approx(blocks.disk.alpha, rel=1e-4)
+            assert found.delay_margin_s == pytest.approx(
+                blocks.delay_margin_s, rel=1e-4
+            )
 
 
 def test_no_corner_of_a_route_is_worse_than_proven(filtered):
@@ -61,6 +78,20 @@ def test_no_corner_of_a_route_is_worse_than_proven(filtered):
         for row in itertools.product(*ends)
     ]
     assert max(corners) / filtered.tick_s <= bound.proven_growth_per_s
+    # The margins of the corners, by the loops themselves.
+    margins = [
+        loop_margins(family.opened.model_of(np.empty(0)))
+        for row in itertools.islice(itertools.product(*ends), 0, None, 17)
+        for family in route_families(filtered)(
+            {p.name: (value, value) for p, value in zip(box, row, strict=True)}
+        )
+    ]
+    for worst, values in (
+        (bound.disk_margin, [each.disk.alpha for each in margins]),
+        (bound.delay_margin_s, [each.delay_margin_s for each in margins]),
+    ):
+        assert 0.97 * worst.found < worst.proven < worst.found
+        assert worst.proven < min(values) < 1.5 * worst.found
 
 
 def test_a_late_object_sensor_has_no_reduced_loop(filtered):
