@@ -64,6 +64,10 @@ _OTHER_UNITS = 3.5
 # An array is flat if its thickness is below the share _THIN of its size.
 _FLAT, _FLATTER, _THIN = 0.15, 0.1, 0.3
 
+# Least number of channels whose delays confirm that one of them is late. The only
+# delay of two may be a chance peak of tones.
+_CONFIRMED = 3
+
 # Largest difference between a delay and the sum of two others that agree with it, in
 # addition to two samples, s.
 _AGREE_S = 2e-4
@@ -191,6 +195,8 @@ def unaligned_channels(
         return None
     arrival = _arrivals(lags, search)
     heard = np.flatnonzero(np.isfinite(arrival))
+    if heard.size < _CONFIRMED:
+        return None
     t, p = arrival[heard], search.shape.p_AM[heard]
     apart = np.linalg.norm(p[:, np.newaxis] - p, axis=2)
     together = np.abs(t[:, np.newaxis] - t) <= (

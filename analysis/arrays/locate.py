@@ -14,7 +14,12 @@ from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.far_field import locate_far_source
 from analysis.arrays.heard_calls import arrivals_alike, heard_calls
-from analysis.arrays.heard_sources import HeardSource, HeardSources, heard_sources
+from analysis.arrays.heard_sources import (
+    ECHOES,
+    HeardSource,
+    HeardSources,
+    heard_sources,
+)
 from analysis.arrays.heard_tones import heard_tones, unclear_tone
 from analysis.arrays.locate_result import LocatedSource
 from analysis.arrays.loud_echo import loud_echo
@@ -125,6 +130,10 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
             (spectra.low_hz, spectra.high_hz),
         )
     )
+    if isinstance(search, RecordingSearch) and isinstance(
+        search.recording, OnsetSpectra
+    ):
+        sources = replace(sources, needs_estimates=ECHOES)
     result = LocatedSource(
         array,
         shape,
