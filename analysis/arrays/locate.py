@@ -33,6 +33,7 @@ from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.recording_search import RecordingSearch, Sighting
 from analysis.arrays.recording_spectra import (
     AFTER_S,
+    REVERBERATION_S,
     OnsetSpectra,
     RecordingSpectra,
 )
@@ -130,9 +131,7 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
             (spectra.low_hz, spectra.high_hz),
         )
     )
-    if isinstance(search, RecordingSearch) and isinstance(
-        search.recording, OnsetSpectra
-    ):
+    if _is_brief(heard):
         sources = replace(sources, needs_estimates=ECHOES)
     result = LocatedSource(
         array,
@@ -145,6 +144,16 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
         recorded.remarks,
     )
     return replace(result, faults=heard.faults + _echoes(result, heard, known))
+
+
+def _is_brief(heard: HeardRecording) -> bool:
+    """Returns whether most votes may be those of echoes after short sounds."""
+    if heard.recording.seconds < REVERBERATION_S:
+        return True
+    search = heard.search
+    return isinstance(search, RecordingSearch) and isinstance(
+        search.recording, OnsetSpectra
+    )
 
 
 def _echoes(
