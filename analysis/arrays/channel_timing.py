@@ -219,12 +219,14 @@ def unaligned_channels(
     ratio = float((paths * search.c / np.where(apart > 0.0, apart, np.inf)).max())
     # The positions may be wrong instead.
     if _in_other_units(t, p, search.c):
-        return None
-    if one is not None or ratio < _OTHER_UNITS:
+        misplaced = True
+    elif one is not None or ratio < _OTHER_UNITS:
         longest_s = _ALLOWED * float(apart.max()) / search.c
-        if 2 * sizes.max() <= len(t) or np.ptp(t) < longest_s or _fits(t, p, search.c):
-            return None
-    elif sizes.size > 2 and (_fits_any(t, p) or _is_wave(t, p, _FLAT)):
+        few = 2 * sizes.max() <= len(t)
+        misplaced = few or np.ptp(t) < longest_s or _fits(t, p, search.c)
+    else:
+        misplaced = sizes.size > 2 and (_fits_any(t, p) or _is_wave(t, p, _FLAT))
+    if misplaced:
         return None
     numbers = np.array(search.numbers)[heard]
     return _late_fault(t, p, numbers, group, search.c)
