@@ -222,10 +222,10 @@ def unaligned_channels(
         misplaced = True
     elif one is not None or ratio < _OTHER_UNITS:
         longest_s = _ALLOWED * float(apart.max()) / search.c
-        few = 2 * sizes.max() <= len(t)
-        misplaced = few or np.ptp(t) < longest_s or _fits(t, p, search.c)
+        few = bool(2 * sizes.max() <= len(t))
+        misplaced = few or bool(np.ptp(t) < longest_s) or _fits(t, p, search.c)
     else:
-        misplaced = sizes.size > 2 and (_fits_any(t, p) or _is_wave(t, p, _FLAT))
+        misplaced = bool(sizes.size > 2) and (_fits_any(t, p) or _is_wave(t, p, _FLAT))
     if misplaced:
         return None
     numbers = np.array(search.numbers)[heard]
