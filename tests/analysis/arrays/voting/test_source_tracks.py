@@ -53,7 +53,7 @@ def test_a_track_begins_within_half_a_second_and_ends_within_two():
 
 
 def test_a_track_whose_share_falls_is_reported_no_longer():
-    """After m detections of 0.05, the mean (3 + 0.05 m) / (10 + m) is 0.2 at m = 6.7."""
+    """After m of 0.05, the mean share (3 + 0.05 m) / (10 + m) is 0.2 at m = 6.7."""
     memory, heard = TrackMemory(), []
     for k in range(20):
         detections = [detected(0.5, 0.3 if k < 10 else 0.05)]
