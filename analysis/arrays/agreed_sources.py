@@ -130,8 +130,8 @@ def _doubts(
     of_count = []
     if heard.beside_steady:
         of_count.append("one of the sounds is steady")
-    if heard.side_lobes and not all(_are_confirmed(of_source)):
-        of_count.append("directions may be side lobes of a wide array")
+    if heard.needs_estimates and not all(_are_confirmed(of_source)):
+        of_count.append(heard.needs_estimates)
     return _Doubts(of_all, of_count)
 
 
@@ -164,10 +164,14 @@ def _joined(
     if not heard.sources:
         return [], []
     first = _main(heard, of_source)
-    sources = [
-        source if sure or not heard.side_lobes else _capped(source)
-        for source, sure in zip(heard.sources, _are_confirmed(of_source), strict=True)
-    ]
+    sources = heard.sources.copy()
+    if heard.needs_estimates:
+        sources = [
+            _measured(source, estimates, own) if sure else _capped(source)
+            for source, own, sure in zip(
+                sources, of_source, _are_confirmed(of_source), strict=True
+            )
+        ]
     main = _measured(sources.pop(first), estimates, of_source[first])
     return [main, *sources], of_source[first]
 
@@ -175,12 +179,12 @@ def _joined(
 def _main(heard: HeardSources, of_source: list[list[int]]) -> int:
     """Returns the number of the main source.
 
-    The response of wide arrays does not tell how loud each source is, so their main
-    source is the one with most estimates.
+    The votes of wide arrays and of echoes do not tell how loud each source is, so the
+    main source is then the one with most estimates.
     """
     shares = np.array([source.share for source in heard.sources])
     counts = np.array([len(chosen) for chosen in of_source])
-    alike = heard.side_lobes | (shares >= _AS_LOUD * shares.max())
+    alike = (heard.needs_estimates is not None) | (shares >= _AS_LOUD * shares.max())
     return int(np.lexsort((-shares, -counts, ~alike))[0])
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays.diffuse_sound import without_diffuse
-from analysis.arrays.phase_agreement import climb, sums
+from analysis.arrays.phase_agreement import climb, pair_delays, pairs_of, sums
 
 _BANDS = 24
 _LEAST_BANDS = 4
@@ -78,7 +78,7 @@ def fit_aligned_delays(
     Returns:
         The delays and their errors. None if the channels do not agree on any delays.
     """
-    first, second = np.triu_indices(len(spectra), 1)
+    first, second = pairs_of(len(spectra))
     power = np.mean(np.abs(spectra) ** 2, axis=0)
     floor = _FLOOR * power.mean(axis=0) + np.finfo(np.float32).tiny
     flat = weights / (power + floor)
@@ -144,13 +144,11 @@ def _coherence_gain(
     edges: NDArray[np.int64],
 ) -> NDArray[np.float64]:
     """Returns (f,) weights r / (1 - r^2) of phases with the coherence r."""
-    later = np.concatenate(([0.0], tau))
-    first, second = np.triu_indices(later.size, 1)
-    turned = cross * np.exp(1j * np.outer(later[second] - later[first], w))
+    turned = cross * np.exp(1j * np.outer(pair_delays(tau), w))
     in_phase = np.add.reduceat(turned.real.mean(axis=0), edges[:-1])
     whole = np.add.reduceat(total, edges[:-1])
     r = np.clip(in_phase / np.maximum(whole, 1e-30), 0.0, _MOST_COHERENT)
     # A coherence that noise alone can reach counts as 0.
-    noise = 2.0 / np.sqrt(np.maximum(whole * len(first), 1.0))
+    noise = 2.0 / np.sqrt(np.maximum(whole * len(cross), 1.0))
     r[r < noise] = 0.0
     return np.repeat(r / (1.0 - r**2), np.diff(edges))

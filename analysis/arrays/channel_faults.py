@@ -136,6 +136,9 @@ def find_channel_faults(
         return [delays(each) for each in seen if each is not None]
 
     of_geometry = geometry_faults(delays(measured), c, farther)
+    if any(fault.kind == "units" for fault in of_geometry):
+        # Signs were looked for at delays of another array.
+        found = [fault for fault in found if fault not in inverted]
     return found + _not_of_directivity(of_geometry, measured, array.gain_std_db)
 
 

@@ -28,6 +28,7 @@ from analysis.arrays.array_geometry import (
     usable_band,
 )
 from analysis.arrays.channel_fault import ChannelFault, channel_names
+from analysis.arrays.frame_delays import REACHES_M
 from systems.delays.correlations import correlations_at_lags, parabola_vertex
 from systems.sound.array_shape import ArrayShape
 
@@ -59,10 +60,19 @@ _ALLOWED = 1.15
 # are wrong rather than the clocks.
 _OTHER_UNITS = 3.5
 
+# Ratios of common units of length: centimeters or millimeters, and inches. Delays whose
+# wave front is slower by such a ratio, within the share _NEAR_UNITS, are those of
+# positions in another unit.
+_UNITS, _NEAR_UNITS = np.array([10.0, 25.4, 39.4, 100.0, 1000.0]), 0.05
+
 # Largest misfit of a wave front, as a share of the longest delay. Near sources cause
 # curved wave fronts. The smaller share applies if delays are only a few times too long.
 # An array is flat if its thickness is below the share _THIN of its size.
 _FLAT, _FLATTER, _THIN = 0.15, 0.1, 0.3
+
+# Least number of channels whose delays confirm that one of them is late. The only
+# delay of two may be a chance peak of tones.
+_CONFIRMED = 3
 
 # Largest difference between a delay and the sum of two others that agree with it, in
 # addition to two samples, s.
@@ -191,6 +201,8 @@ def unaligned_channels(
         return None
     arrival = _arrivals(lags, search)
     heard = np.flatnonzero(np.isfinite(arrival))
+    if heard.size < _CONFIRMED:
+        return None
     t, p = arrival[heard], search.shape.p_AM[heard]
     apart = np.linalg.norm(p[:, np.newaxis] - p, axis=2)
     together = np.abs(t[:, np.newaxis] - t) <= (
@@ -206,11 +218,15 @@ def unaligned_channels(
     paths = np.abs(t[:, np.newaxis] - t) - 2.0 / rate
     ratio = float((paths * search.c / np.where(apart > 0.0, apart, np.inf)).max())
     # The positions may be wrong instead.
-    if one is not None or ratio < _OTHER_UNITS:
+    if _in_other_units(t, p, search.c):
+        misplaced = True
+    elif one is not None or ratio < _OTHER_UNITS:
         longest_s = _ALLOWED * float(apart.max()) / search.c
-        if 2 * sizes.max() <= len(t) or np.ptp(t) < longest_s or _fits(t, p, search.c):
-            return None
-    elif sizes.size > 2 and (_fits_any(t, p) or _is_wave(t, p, _FLAT)):
+        few = bool(2 * sizes.max() <= len(t))
+        misplaced = few or bool(np.ptp(t) < longest_s) or _fits(t, p, search.c)
+    else:
+        misplaced = bool(sizes.size > 2) and (_fits_any(t, p) or _is_wave(t, p, _FLAT))
+    if misplaced:
         return None
     numbers = np.array(search.numbers)[heard]
     return _late_fault(t, p, numbers, group, search.c)
@@ -305,6 +321,21 @@ def _fits(t: NDArray[np.float64], p: NDArray[np.float64], c: float) -> bool:
         return _is_wave(t, p, _FLATTER)
     slowness = np.linalg.norm(_flattened(p)[1] @ (t - t.mean()))
     return float(slowness) * c < _OTHER_UNITS
+
+
+def _in_other_units(t: NDArray[np.float64], p: NDArray[np.float64], c: float) -> bool:
+    """Returns whether positions of four microphones in space are in another unit.
+
+    A wave explains any times of four microphones in space, and tells its speed. Whether
+    a longer array is in other units is not examined.
+    """
+    centered = p - p.mean(axis=0)
+    if len(t) != 4 or np.linalg.matrix_rank(_flattened(p)[1]) < 3:
+        return False
+    ratio = np.linalg.norm(np.linalg.solve(centered[1:], t[1:] - t.mean())) * c
+    true_m = ratio * 2.0 * np.linalg.norm(centered, axis=1).max()
+    alike = np.any(np.abs(ratio / _UNITS - 1.0) < _NEAR_UNITS)
+    return bool(alike and true_m < max(REACHES_M))
 
 
 def _flattened(

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.arrays.phase_agreement import climb, sums
+from analysis.arrays.phase_agreement import climb, pair_delays, sums
 
 # Shares of diffuse sound that are compared. The best share is interpolated.
 _SHARES = np.linspace(0.0, 0.9, 10)
@@ -112,9 +112,7 @@ def _model(
     w: NDArray[np.float64],
 ) -> NDArray[np.complex128]:
     """Returns (p, f) cross-spectra of direct and diffuse sound with the power 1."""
-    later = np.concatenate(([0.0], tau))
-    first, second = np.triu_indices(later.size, 1)
-    turn = np.exp(-1j * np.outer(later[second] - later[first], w))
+    turn = np.exp(-1j * np.outer(pair_delays(tau), w))
     return (1.0 - share) * turn + share * diffuse
 
 

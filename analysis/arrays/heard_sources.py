@@ -28,6 +28,11 @@ from analysis.arrays.voting.vote_peaks import VotedSource, gather_sources
 from analysis.arrays.voting.vote_records import DirectionVotes, join_votes
 from systems.sound.array_shape import ArrayShape
 
+#: Reasons for which votes need estimates. If microphones are far apart, the steered
+#: response has side lobes. Between short sounds, only their echoes vote.
+SIDE_LOBES = "directions may be side lobes of a wide array"
+ECHOES = "directions may be echoes of short sounds"
+
 # Samples per channel in each block of votes.
 _BLOCK = 2**16
 
@@ -126,9 +131,9 @@ class HeardSources:
     unfit: bool = False
     """Whether the phases are not those of sound from far away at this array. The
     directions may then be wrong."""
-    side_lobes: bool = False
-    """Whether the microphones are so far apart that the steered response has side
-    lobes, which may be reported as sources."""
+    needs_estimates: str | None = None
+    """Why a source of the votes may be none if no estimate confirms it. None if votes
+    suffice."""
 
 
 _Told = TypeVar("_Told", HeardSource, FollowedSource)
@@ -181,7 +186,7 @@ def heard_sources(
         steady,
         beside_steady=any(fan for _, fan in told),
         unfit=is_unfit(votes),
-        side_lobes=plan.bins.start == plan.bins.stop,
+        needs_estimates=SIDE_LOBES if plan.bins.start == plan.bins.stop else None,
     )
 
 

@@ -14,7 +14,12 @@ from analysis.arrays.call_search import CallSearch
 from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.far_field import locate_far_source
 from analysis.arrays.heard_calls import arrivals_alike, heard_calls
-from analysis.arrays.heard_sources import HeardSource, HeardSources, heard_sources
+from analysis.arrays.heard_sources import (
+    ECHOES,
+    HeardSource,
+    HeardSources,
+    heard_sources,
+)
 from analysis.arrays.heard_tones import heard_tones, unclear_tone
 from analysis.arrays.locate_result import LocatedSource
 from analysis.arrays.loud_echo import loud_echo
@@ -28,6 +33,7 @@ from analysis.arrays.recorded_samples import RecordedSamples
 from analysis.arrays.recording_search import RecordingSearch, Sighting
 from analysis.arrays.recording_spectra import (
     AFTER_S,
+    REVERBERATION_S,
     OnsetSpectra,
     RecordingSpectra,
 )
@@ -125,6 +131,8 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
             (spectra.low_hz, spectra.high_hz),
         )
     )
+    if _is_brief(heard):
+        sources = replace(sources, needs_estimates=ECHOES)
     result = LocatedSource(
         array,
         shape,
@@ -136,6 +144,16 @@ def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocatedSource
         recorded.remarks,
     )
     return replace(result, faults=heard.faults + _echoes(result, heard, known))
+
+
+def _is_brief(heard: HeardRecording) -> bool:
+    """Returns whether most votes may be those of echoes after short sounds."""
+    if heard.recording.seconds < REVERBERATION_S:
+        return True
+    search = heard.search
+    return isinstance(search, RecordingSearch) and isinstance(
+        search.recording, OnsetSpectra
+    )
 
 
 def _echoes(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,20 @@ from systems.framework.compiling import njit
 _STEPS = 12
 # The search ends if the steps are below this share of a quarter of the shortest period.
 _SETTLED = 1e-4
+
+
+@lru_cache
+def pairs_of(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Returns the first and the second channel of each of the p pairs of channels."""
+    first, second = np.triu_indices(count, 1)
+    return first, second
+
+
+def pair_delays(tau: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the (p,) delays of pairs from (n - 1,) delays after channel 0, s."""
+    later = np.concatenate(([0.0], tau))
+    first, second = pairs_of(later.size)
+    return later[second] - later[first]
 
 
 def climb(

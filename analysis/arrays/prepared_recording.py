@@ -50,8 +50,9 @@ _NEGATIVE = ("inverted", "directional")
 # power of such a recording that belongs to its sounds.
 _AUDIBLE, _LEAST_SHARE = 0.05, 0.02
 
-# Kinds of faults that follow from delays.
-_OF_DELAYS = ("drift", "geometry", "size", "speed", "swapped", "unaligned", "units")
+# Kinds of faults that follow from delays within the array. Whole periods of a tone do
+# not explain longer delays, on which several channels agree.
+_OF_DELAYS = ("drift", "geometry", "size", "speed", "swapped", "units")
 
 # Largest number of channels in one message.
 _MOST_NAMED = 8

@@ -138,10 +138,12 @@ def _lag(
     """
     correlation = np.abs(fft.irfft(first * np.conj(second), size))
     lag = int(correlation[: most + 1].argmax())
+    if lag <= reach:
+        return None
     noise = float(np.median(correlation)) / 0.6745
     direct = max(correlation[: reach + 1].max(), correlation[-reach:].max())
     clear = correlation[lag] > max(_LEAST_PEAK * noise, _ABOVE_DIRECT * direct)
-    return lag if lag > reach and clear else None
+    return lag if clear else None
 
 
 def _changing(

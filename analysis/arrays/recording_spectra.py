@@ -36,9 +36,9 @@ _QUIET_TO_MEAN = 1.5
 _LEAST_CONTRAST_DB = 6.0
 #: Least power that counts, as a multiple of the noise power.
 ABOVE_NOISE = 2.0
-# _REVERBERATION_S: assumed reverberation time of the room, s.
-# _ECHO_SHARE: share of the expected echo that is subtracted.
-_REVERBERATION_S = 0.5
+#: Assumed reverberation time of the room, s.
+REVERBERATION_S = 0.5
+# Share of the expected echo that is subtracted.
 _ECHO_SHARE = 0.8
 
 # Time from the start of a window to the onset, s, in addition to the travel time of
@@ -91,6 +91,11 @@ class RecordingSpectra:
     """Longest travel time of sound between two microphones, s."""
     levels: tuple[float, ...] | None = None
     """Levels of the n channels as recorded, in any unit. None: equal levels."""
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the recording, s."""
+        return self.channels.shape[1] / self.sample_rate_hz
 
     @cached_property
     def window(self) -> NDArray[np.float32]:
@@ -186,7 +191,7 @@ class RecordingSpectra:
         tiny = np.finfo(np.float32).tiny
         power = np.maximum(self.power, tiny)
         hop_s = self.hop / self.sample_rate_hz
-        decay = np.float32(10.0 ** (-6.0 * hop_s / _REVERBERATION_S))
+        decay = np.float32(10.0 ** (-6.0 * hop_s / REVERBERATION_S))
         echo = np.zeros_like(power)
         for k in range(1, len(power)):
             echo[k] = decay * np.maximum(echo[k - 1], power[k - 1])

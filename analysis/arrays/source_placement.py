@@ -97,11 +97,9 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     own = delays.covariance + _reflections(delays, array)
     bent = min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
     lying = shape.dimension == 2 and shape.kind == "plane"
-    u = _direction(tau, own, array)
-    far = locate_far_source(
-        tau, own + _budget(u, 0.0, array), shape, c, inverse_range_std=bent
-    )
-    near, allowed = _near(tau, own, u, array)
+    plane = _plane_errors(tau, own, array)
+    far = locate_far_source(tau, own + plane, shape, c, inverse_range_std=bent)
+    near, allowed = _near(tau, own, plane, array)
     # The delays at a body are known for distant sources only.
     if (
         shape.body is None
@@ -121,13 +119,12 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
         if not told:
             near, systematic = near.without_range(), systematic.without_range()
         return PlacedSource(near, systematic)
-    allowed = _budget(u, 0.0, array)
     if lying:
         # The delays of a source above the plane are shorter than those of any source in
         # it.
         shape = ArrayShape.of(np.pad(shape.p_AM, ((0, 0), (0, 1))))
-    far = locate_far_source(tau, own + allowed, shape, c, inverse_range_std=bent)
-    systematic = locate_far_source(tau, allowed, shape, c, own)
+        far = locate_far_source(tau, own + plane, shape, c, inverse_range_std=bent)
+    systematic = locate_far_source(tau, plane, shape, c, own)
     if lying:
         far, systematic = _level(far), _level(systematic)
     freedom = shape.freedom + (0 if lying else 1)
@@ -135,10 +132,10 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     return PlacedSource(far, systematic) if fits else None
 
 
-def _direction(
+def _plane_errors(
     tau: NDArray[np.float64], own: NDArray[np.float64], array: KnownArray
 ) -> NDArray[np.float64]:
-    """Returns the (d,) unit vector to the source, as if the source were far away."""
+    """Returns the covariance of the array's delay errors for a distant source, s^2."""
     shape = array.shape
     allowed = (array.budget.position_std / array.c) ** 2 * (
         np.eye(shape.count - 1) + 1.0
@@ -146,17 +143,19 @@ def _direction(
     for _ in range(_ROUNDS):
         u = locate_far_source(tau, own + allowed, shape, array.c).p_AS
         allowed = _budget(u, 0.0, array)
-    return u
+    return allowed
 
 
 def _near(
     tau: NDArray[np.float64],
     own: NDArray[np.float64],
-    u: NDArray[np.float64],
+    allowed: NDArray[np.float64],
     array: KnownArray,
 ) -> tuple[SourceFix, NDArray[np.float64]]:
-    """Estimates a position at a finite range, and the array's delay errors for it."""
-    allowed = _budget(u, 0.0, array)
+    """Estimates a position at a finite range, and the array's delay errors for it.
+
+    The search begins with the delay errors ``allowed``.
+    """
     for _ in range(_ROUNDS):
         near = locate_source(tau, own + allowed, array.shape, array.c)
         if not near.range_valid:
@@ -248,8 +247,8 @@ def tolerance(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
     It holds for a distant source, and is to be added to the covariance of the noise.
     """
     reflected = _reflections(delays, array)
-    u = _direction(delays.tau, delays.covariance + reflected, array)
-    return reflected + _budget(u, 0.0, array)
+    own = delays.covariance + reflected
+    return reflected + _plane_errors(delays.tau, own, array)
 
 
 def chi_square_limit(freedom: int) -> float:

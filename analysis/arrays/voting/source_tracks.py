@@ -41,6 +41,10 @@ from analysis.arrays.voting.vote_peaks import VotedSource
 # Largest angle between a detection and its track, rad.
 _FARTHEST = math.radians(45.0)
 
+# A reported track ends if the mean share of its detections falls below this part of
+# ``TrackParameters.least_share``. Most such tracks are reflections.
+_KEPT = 0.8
+
 
 @dataclass(frozen=True)
 class TrackMemory:
@@ -184,11 +188,14 @@ def _over(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
     """Returns whether a track ends at the time t_s.
 
     A track that is not reported yet ends after a short pause. A reported track may
-    pause longer, and even longer if another track may hide it.
+    pause longer, and even longer if another track may hide it. It ends at once if its
+    share of the sound has become too small.
     """
     silence = t_s - track.t_heard
     if track.identity == 0:
         return silence > p.begins_after_s
+    if track.share < _KEPT * p.least_share:
+        return True
     since_hidden = t_s - max(track.t_heard, track.t_shared)
     return since_hidden > p.ends_after_s or silence > p.hidden_s
 

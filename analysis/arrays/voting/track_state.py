@@ -63,7 +63,8 @@ class TrackParameters(Parameters):
     """Least age of a track that is reported, s."""
     least_share: Fraction = 0.25
     """Least share of the heard sound for the first detection of a track. The mean share
-    of its detections must also be at least this value when the track is reported."""
+    of its detections must also be at least this value when the track is reported, and
+    at least 80 % of it afterwards."""
     least_hits: int = Field(default=4, ge=1, le=100)
     """Least number of detections of a track that is reported."""
     ends_after_s: Positive = 1.5

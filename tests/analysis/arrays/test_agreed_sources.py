@@ -93,10 +93,22 @@ def test_votes_that_no_estimate_bears_out_are_left_out_if_they_are_doubted():
 def test_side_lobes_are_not_sure_and_the_confirmed_source_is():
     sources = [source(81.0, 0.6), source(54.0, 0.4)]
     found = estimates(53.0, 54.0, 55.0, 54.0, 81.0)
-    document = located({"sources": sources, "side_lobes": True}, found).document()
+    document = located(
+        {"sources": sources, "needs_estimates": "side lobes"}, found
+    ).document()
     assert [s["bearing_deg"] for s in document["sources"]] == pytest.approx([54, 81])
     assert [s["confidence"] for s in document["sources"]] == [1.0, 0.5]
     assert document["summary"]["number_of_sources"] is None
+
+
+def test_of_sources_that_need_estimates_each_has_the_direction_of_its_own():
+    sources = [source(60.0, 0.6), source(28.0, 0.4)]
+    found = estimates(55.0, 56.0, 57.0, 20.0, 24.0, 22.0)
+    heard = {"sources": sources, "needs_estimates": "side lobes"}
+    document = located(heard, found).document()
+    assert [s["bearing_deg"] for s in document["sources"]] == pytest.approx([56, 22])
+    assert [s["confidence"] for s in document["sources"]] == [1.0, 1.0]
+    assert document["summary"]["number_of_sources"] == 2
 
 
 def test_what_the_votes_missed_comes_first_and_is_not_sure():

@@ -225,7 +225,8 @@ def test_delays_longer_than_the_array(scale, kind):
 
 
 @pytest.mark.parametrize(
-    ("edge_m", "scale"), [(1.0, 0.01), (0.17, 1 / 0.0254), (0.07, 1 / 0.0254)]
+    ("edge_m", "scale"),
+    [(1.0, 0.01), (0.17, 1 / 0.0254), (0.07, 1 / 0.0254), (1.0, 0.1), (0.1, 0.1)],
 )
 def test_a_tetrahedron_in_other_units(edge_m, scale):
     """Its delays reach its edges in every direction, so no source is out of sight."""

@@ -88,6 +88,33 @@ def test_short_sounds_five_meters_away_in_an_echoing_room(tmp_path, seconds, bea
         assert estimate.bearing_deg == pytest.approx(bearing, abs=0.5)
 
 
+def test_echoes_between_claps_are_no_certain_sources():
+    """Most of the time, echoes of the claps come from another direction."""
+    places = 0.05 * np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0.0]])
+    rng = np.random.default_rng(4)
+    clap = rng.standard_normal(240) * np.hanning(240)
+    echoes = np.convolve(clap, rng.standard_normal(9600))
+    echoes *= 0.3 / echoes.std()
+    f = np.fft.rfftfreq(RATE, 1.0 / RATE)
+    heard = 1e-3 * rng.standard_normal((4, 2 * RATE))
+    for bearing, at_s, sound in ((20.0, 0.2, clap), (110.0, 0.22, echoes)):
+        early = places @ [*np.cos(np.radians([bearing, bearing - 90.0])), 0.0] / C
+        turned = np.exp(-2j * np.pi * np.outer(at_s - early, f))
+        rows = np.fft.irfft(np.fft.rfft(sound, RATE) * turned, RATE)
+        heard += np.hstack((rows, rows))
+    stated = {"microphones": places.tolist(), "sound_speed": C}
+    geometry = ArrayGeometry.model_validate(stated)
+    result = locate(heard, geometry, sample_rate_hz=RATE)
+    heard_sources = result.heard.sources
+    assert any(s.confidence > 0.5 and s.bearing_deg > 100.0 for s in heard_sources)
+    first, *others = result.document()["sources"]
+    assert first["bearing_deg"] == pytest.approx(20.0, abs=1.0)
+    assert first["confidence"] > 0.5
+    assert others
+    assert all(other["confidence"] <= 0.5 for other in others)
+    assert "echoes" in result.main_source()["doubt"]
+
+
 def test_onsets_are_where_the_sounds_begin_and_echoes_are_none():
     rng = np.random.default_rng(2)
     length, at = 3 * RATE, [0.7, 1.6, 2.4]

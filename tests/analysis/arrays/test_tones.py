@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.arrays.array_geometry import ArrayGeometry
-from phonotaxis import locate
+from phonotaxis import InputError, locate
 
 C, RATE = 343.2, 16_000
 SQUARE = 0.02285 * np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
@@ -93,3 +93,13 @@ def test_hum_in_phase_is_no_tone():
     hum = sum(np.sin(2.0 * np.pi * f * t) for f in (150.0, 250.0, 350.0))
     noise = 0.05 * np.random.default_rng(1).standard_normal((4, t.size))
     assert not located(hum + noise, SQUARE).estimates
+
+
+def test_a_tone_among_other_sound_hides_no_late_channels():
+    """All but a tenth of the power is that of one line."""
+    rest = np.random.default_rng(6).uniform(300.0, 6000.0, 400)
+    heard = tones_at(SQUARE, [(50.0, [453.0])], 2.0)
+    heard += 0.015 * tones_at(SQUARE, [(50.0, rest)], 2.0)
+    heard[2:] = np.roll(heard[2:], 800, axis=1)
+    with pytest.raises(InputError, match=r"channels 3 and 4 50\.. ms late"):
+        located(heard[:, 800:], SQUARE)

@@ -14,13 +14,13 @@ from analysis.arrays.voting.vote_peaks import VotedSource
 STD = math.radians(2.0)
 
 
-def detected(bearing):
+def detected(bearing, share=1.0):
     return VotedSource(
         bearing=bearing,
         bearing_std=STD,
         elevation=None,
         elevation_std=None,
-        share=1.0,
+        share=share,
         power=1.0,
         rises=1.0,
         votes=10,
@@ -50,6 +50,16 @@ def test_a_track_begins_within_half_a_second_and_ends_within_two():
     heard = [t for t, tracks in told if tracks]
     assert heard[0] <= 1.5
     assert 3.0 <= heard[-1] <= 5.0
+
+
+def test_a_track_whose_share_falls_is_reported_no_longer():
+    """After m of 0.05, the mean share (3 + 0.05 m) / (10 + m) is 0.2 at m = 6.7."""
+    memory, heard = TrackMemory(), []
+    for k in range(20):
+        detections = [detected(0.5, 0.3 if k < 10 else 0.05)]
+        tracks, memory = step_tracks(detections, 0.1 * k, memory, TrackParameters())
+        heard += [k] if tracks else []
+    assert heard[-1] == 9 + 6
 
 
 def test_two_that_cross_keep_their_identities():
