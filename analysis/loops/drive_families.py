@@ -37,8 +37,8 @@ from analysis.loops.robustness import (
 )
 from diagrams.scenario.scenario import Scenario
 from systems.laws.guarded_controller import cruise_speed
-from systems.planning.following import APPROACH_GAIN
 from systems.planning.drive_heading import LOOK_AHEAD_M
+from systems.planning.following import APPROACH_GAIN
 from systems.planning.turning import TURN_GAIN
 
 #: Least speed and least distance of the carrot, as shares of the largest.
