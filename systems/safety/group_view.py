@@ -160,7 +160,7 @@ def look_along_row(
     slope -= 1e-9 * (1.0 + abs(slope))
     turn = math.atan2(begin_y, dx) - view.begin
     turn -= math.tau * math.floor(turn / math.tau)
-    sector, k = np.searchsorted(view.turns[:size], turn, side="right") - 1, 0
+    sector, k = int(np.searchsorted(view.turns[:size], turn, side="right")) - 1, 0
     while k < count:
         next_edge, end = sector, count
         if sense > 0.0:
