@@ -145,6 +145,7 @@ def test_snapshots_lie_on_one_grid(guarded_run):
 
 def test_the_window_that_leaves_a_place_forgets_it(monkeypatch):
     monkeypatch.setattr("systems.safety.parameters.WINDOW_M", 4.0)
+    monkeypatch.setattr("systems.safety.parameters._WINDOW_RADII", 0.0)
     result = simulate(guarded("duration_s=6"))
     known = known_space(result, [0.0, result.simulated_s])
     assert known is not None
