@@ -51,8 +51,8 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
             raise InputError(
                 "law",
                 f"{law!r} decides anew in each tick, so that it has no linear model; "
-                f"use guarded, {', '.join(every)}, and add --guard on to include the "
-                "promises of the guard",
+                f"use {', '.join(every)}, and add --guard on to include the promises "
+                "of the guard, or use guarded",
             )
     return tuple(
         scenario_from_mapping({**scenario.model_dump(), "law": law})

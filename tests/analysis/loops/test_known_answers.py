@@ -126,6 +126,15 @@ def island_growth():
     return digits(found.growth_per_s, found.proven_growth_per_s), NONE
 
 
+def worst(margin):
+    found = phonotaxis.worst_margins(
+        lambda v: control.tf([v["K"]], [1.0, v["p"], 0.0]),
+        {"K": (1.0, 3.0), "p": (0.5, 1.5)},
+    )
+    either = getattr(found, margin)
+    return digits(either.found, either.proven), NONE
+
+
 def light_mode():
     mode = control.tf([0.2], [1.0, 0.02, 100.0]) + control.tf([0.2], [1.0, 0.0])
     return delay(control.ss(mode))
@@ -161,6 +170,8 @@ CASES = [
             period_s=1.0,
         )
     ),
+    lambda: worst("disk"),
+    lambda: worst("delay"),
 ]
 
 
@@ -185,6 +196,8 @@ def test_known_answer(k):
     ours = [float(word) for word in row[3].split(", ")]
     if "scale" in row[0] or "growth" in row[0]:
         assert ours[0] * (1.0 - 1e-3) <= stated[0] <= ours[1] * (1.0 + 1e-3)
+    elif "worst" in row[0]:
+        assert ours[1] <= stated[0] <= ours[0] * (1.0 + 1e-3)
     elif "satellite: disk margin of both" in row[0]:
         assert stated[0] <= ours[0] <= stated[1]
     else:
