@@ -32,9 +32,7 @@ def ring(count: int, **fields: Any) -> UltrasonicParameters:
 class Driven:
     """A detector that is driven tick by tick."""
 
-    def __init__(
-        self, sensors: UltrasonicParameters = SCAN, known: Any = ()
-    ) -> None:
+    def __init__(self, sensors: UltrasonicParameters = SCAN, known: Any = ()) -> None:
         self.sensors = sensors
         self.block = ObjectDetector(sensors=sensors, robot=BURGER, known=known)
         self.state, self.tick = np.array(self.block.step.state), 0
