@@ -139,7 +139,8 @@ class Latency:
     """A delay on the way from a measured quantity to the wheels."""
 
     path: str
-    """What is measured: ``source``, ``target``, ``obstacle``, or ``heading``."""
+    """What is measured: ``source``, ``goal``, ``target``, ``obstacle``, or
+    ``heading``."""
     part: str
     """What causes the delay."""
     mean_s: float
@@ -228,7 +229,8 @@ def _parameters(scenario: Scenario) -> Iterator[ParameterRow]:
     if isinstance(robot, Follower):
         if robot.gains is not None:
             groups[f"laws.{robot.law}."] = robot.gains
-        groups["sound."] = scenario.source.sound
+        if robot.hearing != "ideal_always":
+            groups["sound."] = scenario.source.sound
     others = _OTHERS | _NOT_GUARDED if plans(robot.law) else _OTHERS
     for prefix, group in groups.items():
         yield from (row for row in _rows(group, prefix) if row.field not in others)
@@ -259,10 +261,12 @@ def _one_line(text: str) -> str:
 
 def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
     robot, sensors = scenario.only.robot, scenario.follower.ultrasonic
+    source, target = scenario.source, _target(scenario)
+    speed = source.speed_m_s if source.path().moves else 0.0
     return (
         Limit("speed of P", robot.top_speed_m_s, "m/s", "limit of the state v_P"),
         Limit("wheel speed", robot.top_wheel_speed, "rad/s", "both scaled together"),
-        Limit("speed of the source", scenario.source.speed_m_s, "m/s", "this scenario"),
+        Limit(f"speed of the {target}", speed, "m/s", "this scenario"),
         Limit(
             "nearest echo",
             sensors.minimum_range_m,
@@ -279,23 +283,38 @@ def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
     )
 
 
+def _target(scenario: Scenario) -> str:
+    """Returns ``source``, or ``goal`` if the robot drives to a goal point."""
+    return "goal" if scenario.drives_to_point(next(iter(scenario.robots))) else "source"
+
+
 def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
-    tick, sound = scenario.tick_s, scenario.source.sound
-    frame = f"middle of a {tick * 1e3:g} ms frame"
-    silent = max(sound.period_s - sound.on_s, 0.0)
     return (
-        Latency("source", "sound collected", tick / 2.0, frame),
-        Latency("source", "estimate computed", tick, "TDOAEstimator: one tick"),
-        Latency(
+        *_hearing_latencies(scenario),
+        *_drive_latencies(scenario, _target(scenario)),
+        Latency("obstacle", "echo measured", 0.0, "travel time is not modeled"),
+        *_drive_latencies(scenario, "obstacle"),
+    )
+
+
+def _hearing_latencies(scenario: Scenario) -> Iterator[Latency]:
+    """Yields the delays of the robot's hearing; ideal hearing has fewer."""
+    tick, hearing = scenario.tick_s, scenario.follower.hearing
+    target, sound = _target(scenario), scenario.source.sound
+    if hearing == "audio":
+        frame = f"middle of a {tick * 1e3:g} ms frame"
+        yield Latency("source", "sound collected", tick / 2.0, frame)
+        yield Latency("source", "estimate computed", tick, "TDOAEstimator: one tick")
+    else:
+        yield Latency(target, "position measured", tick, "IdealSourceSensor: one tick")
+    if hearing != "ideal_always":
+        silent = max(sound.period_s - sound.on_s, 0.0)
+        yield Latency(
             "source",
             "silence between bursts",
             silent**2 / (2.0 * sound.period_s),
             f"up to {silent:g} s; 0 while the source sounds; the tracker bridges it",
-        ),
-        *_drive_latencies(scenario, "source"),
-        Latency("obstacle", "echo measured", 0.0, "travel time is not modeled"),
-        *_drive_latencies(scenario, "obstacle"),
-    )
+        )
 
 
 def _drive_latencies(scenario: Scenario, path: str) -> tuple[Latency, Latency]:

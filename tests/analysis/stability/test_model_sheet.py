@@ -32,6 +32,17 @@ def test_latency_of_source_and_obstacle() -> None:
     )
     always = model_sheet(load_scenario("default", ["sound.period_s=0.5"]))
     assert always.latency_s("source") == pytest.approx(0.1)
+    ideal = model_sheet(load_scenario("default", ["hearing=ideal"]))
+    assert ideal.latency_s("source") == pytest.approx(0.025 + 0.0125 + 0.05 + 0.5625)
+
+
+def test_a_goal_point_makes_no_sound() -> None:
+    sheet = model_sheet(load_scenario({"goal_m": [3.0, 1.0], "law": "active"}))
+    assert sheet.paths == ("goal", "obstacle")
+    assert sheet.latency_s("goal") == pytest.approx(0.025 + 0.0125 + 0.05)
+    assert not any(row.field.startswith("sound.") for row in sheet.parameters)
+    limits = {limit.quantity: limit.value for limit in sheet.envelope}
+    assert limits["speed of the goal"] == 0.0
 
 
 def test_fingerprint_is_of_everything_in_the_scenario() -> None:
