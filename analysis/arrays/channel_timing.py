@@ -326,8 +326,8 @@ def _fits(t: NDArray[np.float64], p: NDArray[np.float64], c: float) -> bool:
 def _in_other_units(t: NDArray[np.float64], p: NDArray[np.float64], c: float) -> bool:
     """Returns whether positions of four microphones in space are in another unit.
 
-    A wave explains any times of four microphones in space, and tells its speed. Whether
-    a longer array is in other units is not examined.
+    For four microphones in space, some plane wave explains any arrival times. Its
+    speed shows the unit of the positions. The function examines no other arrays.
     """
     centered = p - p.mean(axis=0)
     if len(t) != 4 or np.linalg.matrix_rank(_flattened(p)[1]) < 3:

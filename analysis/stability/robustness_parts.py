@@ -277,16 +277,27 @@ CONTACT_ROBUSTNESS = _part(
 )
 
 
-def _on_a_route(study: Study) -> LoopRobustness:
+def _of_families(
+    study: Study,
+    poles: Callable[[Scenario], PoleFunction],
+    families: Callable[[Scenario], BoxFamilies],
+    uncertainty: Callable[[Scenario], tuple[UncertainParameter, ...]],
+    known_error_per_s: float = 0.0,
+) -> LoopRobustness:
     scenario = study.scenario
     return loop_robustness(
         scenario,
-        route_poles(scenario),
-        route_families(scenario),
-        route_uncertainty(scenario),
+        poles(scenario),
+        families(scenario),
+        uncertainty(scenario),
         samples=4 * _SAMPLES[study.full],
-        known_error_per_s=nominal_difference(scenario, study.need("frozen_gains")),
+        known_error_per_s=known_error_per_s,
     )
+
+
+def _on_a_route(study: Study) -> LoopRobustness:
+    error = nominal_difference(study.scenario, study.need("frozen_gains"))
+    return _of_families(study, route_poles, route_families, route_uncertainty, error)
 
 
 ROUTE_ROBUSTNESS = _part(
@@ -300,14 +311,7 @@ ROUTE_ROBUSTNESS = _part(
 
 
 def _of_the_heading(study: Study) -> LoopRobustness:
-    scenario = study.scenario
-    return loop_robustness(
-        scenario,
-        heading_poles(scenario),
-        heading_families(scenario),
-        heading_uncertainty(scenario),
-        samples=4 * _SAMPLES[study.full],
-    )
+    return _of_families(study, heading_poles, heading_families, heading_uncertainty)
 
 
 HEADING_ROBUSTNESS = _part(
@@ -321,14 +325,7 @@ HEADING_ROBUSTNESS = _part(
 
 
 def _on_free_floor(study: Study) -> LoopRobustness:
-    scenario = study.scenario
-    return loop_robustness(
-        scenario,
-        drive_poles(scenario),
-        drive_families(scenario),
-        drive_uncertainty(scenario),
-        samples=4 * _SAMPLES[study.full],
-    )
+    return _of_families(study, drive_poles, drive_families, drive_uncertainty)
 
 
 DRIVE_ROBUSTNESS = _part(
