@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.planning.half_planes import nearest_velocity
 from systems.ranging.objects import (
-    KNOWN,
     RADIUS,
     ROBOT,
     THERE,
@@ -19,12 +18,11 @@ from systems.ranging.objects import (
     VY,
     X,
     Y,
+    is_moving,
     is_on_map,
 )
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-#: Objects below this speed count as at rest, m/s.
-_RESTS_M_S = 0.02
 #: Constant alpha, 1/s (our choice). P may approach an obstacle at rest at most at alpha
 #: times the remaining distance.
 _APPROACH_RATE = 1.0
@@ -130,13 +128,6 @@ def wheel_planes(
 
 
 @njit(cache=True)
-def _moves(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether an object is known to move."""
-    speed = math.hypot(objects[at + VX], objects[at + VY])
-    return bool(objects[at + KNOWN] > 0.5 and speed > _RESTS_M_S)
-
-
-@njit(cache=True)
 def without_known(
     objects: Any, p_WP: Any, rectangles: Any
 ) -> Any:  # pragma: no cover  (compiled)
@@ -154,7 +145,7 @@ def without_known(
     others = objects.copy()
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE
-        if objects[at + ROBOT] > 0.5 or _moves(objects, at):
+        if objects[at + ROBOT] > 0.5 or is_moving(objects, at):
             continue
         x, y = p_WP[0] + objects[at + X], p_WP[1] + objects[at + Y]
         if is_on_map(x, y, rectangles):
@@ -222,7 +213,7 @@ def filtered_velocity(
         nx, ny = -x / distance, -y / distance
         vx, vy = objects[at + VX], objects[at + VY]
         is_robot = objects[at + ROBOT] > 0.5
-        if is_robot or _moves(objects, at):
+        if is_robot or is_moving(objects, at):
             # A moving object or a robot counts as a disc behind its nearest point.
             center = x - radius * nx, y - radius * ny
             relative = v_WP[0] - vx, v_WP[1] - vy

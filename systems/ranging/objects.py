@@ -35,9 +35,22 @@ OBJECTS_PORT = Port(
     "number, m and m/s in eight slots, see systems.ranging.objects",
 )
 
+#: Objects below this speed count as at rest, m/s.
+_RESTS_M_S = 0.02
 #: An object whose nearest point is this near to a known obstacle is part of it, m (our
 #: choice).
 ON_MAP_M = 0.1
+
+
+@njit(cache=True)
+def is_moving(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
+    """Checks whether an object is known to move.
+
+    ``objects`` is the value of the port, and ``at`` the index of the slot's first
+    element in it.
+    """
+    speed = math.hypot(objects[at + VX], objects[at + VY])
+    return bool(objects[at + KNOWN] > 0.5 and speed > _RESTS_M_S)
 
 
 @njit(cache=True)

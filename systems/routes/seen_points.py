@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.ranging.objects import (
-    KNOWN,
     RADIUS,
     ROBOT,
     THERE,
-    VX,
-    VY,
     X,
     Y,
+    is_moving,
     is_on_map,
 )
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
@@ -30,8 +28,6 @@ from systems.routes.occupancy_grid import (
 
 #: Largest number of remembered points; further points replace the oldest.
 _MOST_POINTS = 4_000
-#: Objects below this speed count as at rest, m/s.
-_RESTS_M_S = 0.02
 #: Objects farther away than this are not remembered, m (our choice). The beams of a
 #: lidar are so far apart there that the nearest point of a wall may be off the wall.
 _REACH_M = 2.0
@@ -58,13 +54,6 @@ def make_seen_points(grid: OccupancyGrid) -> SeenPoints:
 
 
 @njit(cache=True)
-def _moves(objects: Any, at: int) -> bool:  # pragma: no cover  (compiled)
-    """Return whether an object is known to move."""
-    speed = math.hypot(objects[at + VX], objects[at + VY])
-    return objects[at + KNOWN] > 0.5 and speed > _RESTS_M_S
-
-
-@njit(cache=True)
 def remember_objects(
     seen: SeenPoints, grid: OccupancyGrid, rectangles: Any, objects: Any, p_WP: Any
 ) -> None:  # pragma: no cover  (compiled)
@@ -85,7 +74,7 @@ def remember_objects(
         at = slot * OBJECT_SIZE
         if objects[at + THERE] < 0.5 or objects[at + ROBOT] > 0.5:
             continue
-        if _moves(objects, at):
+        if is_moving(objects, at):
             continue
         if math.hypot(objects[at + X], objects[at + Y]) > _REACH_M:
             continue
@@ -128,7 +117,7 @@ def discs_to_avoid(
         at = slot * OBJECT_SIZE
         if objects[at + THERE] < 0.5 or objects[at + ROBOT] < 0.5:
             continue
-        if _moves(objects, at):
+        if is_moving(objects, at):
             continue
         x, y, radius = objects[at + X], objects[at + Y], objects[at + RADIUS]
         # The middle of the disc is behind its nearest point.
