@@ -4,6 +4,8 @@
 PYTHON ?= python3
 PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_DISABLE_PIP_VERSION_CHECK
+# A hundred processes of the tests load the same files: their bytecode is kept.
+unexport PYTHONDONTWRITEBYTECODE
 
 PY := .venv/bin/python
 PIP_INSTALL := $(PY) -m pip install -qq -c constraints.txt

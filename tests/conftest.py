@@ -90,6 +90,26 @@ def made_once(
     return folder_of
 
 
+@pytest.fixture
+def no_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sweeps do their runs in this process: a worker takes 3 s to start.
+
+    ``tests/analysis/batches/test_sweep.py`` and ``tests/test_cli_sweep.py`` have
+    workers, and hold that they give the same rows.
+    """
+    from analysis.batches.one_run import Outcome, Task, run_task
+
+    def here(
+        tasks: Iterator[Task], pulse: Callable[[], None], *, workers: int
+    ) -> Iterator[Outcome]:
+        assert workers >= 1
+        for task in tasks:
+            yield run_task(task)
+            pulse()
+
+    monkeypatch.setattr("analysis.batches.sweep.run_locally", here)
+
+
 #: Chromium without a window: no call home, and no way out, for every other name is
 #: unknown and the proxy is nowhere.
 _CHROMIUM_FLAGS = (

@@ -17,6 +17,7 @@ def call(capsys, *words: str) -> tuple[int, str, str]:
     return status, captured.out, captured.err
 
 
+@pytest.mark.usefixtures("no_workers")
 @pytest.mark.slow
 def test_compare_prints_one_document(capsys, tmp_path):
     out = tmp_path / "out"

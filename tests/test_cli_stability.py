@@ -146,7 +146,8 @@ def test_bad_input_is_one_line_and_status_2(capsys, tmp_path, words, field, hint
     assert not (tmp_path / "out").exists()
 
 
-def test_of_several_robots_one_is_analyzed_alone(quick, capsys, tmp_path):
+def test_of_several_robots_one_is_analyzed_alone(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(report_parts, "parts_for", lambda _: (MASS,))
     documents = []
     for k, chosen in enumerate(([], ["--robot", "second"])):
         out = tmp_path / str(k)

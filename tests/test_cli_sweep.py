@@ -44,6 +44,7 @@ def write(path: Path, text: str) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("no_workers")
 def test_json_document_page_and_reproduction(capsys, tmp_path):
     file, out = write(tmp_path / "two.yaml", SWEEP + "runs: 2\n"), tmp_path / "out"
     words = ["sweep", str(file), "--workers", "1", "--out", str(out)]

@@ -243,6 +243,7 @@ def test_script_of_a_user_runs(tmp_path: Path):
     assert script["hear"]() == pytest.approx(90.0, abs=1.0)
 
 
+@pytest.mark.usefixtures("no_workers")
 def test_a_sweep_gives_table_and_page(tmp_path: Path):
     plan = phonotaxis.SweepPlan(
         scenario="obstacle_free",
@@ -262,6 +263,7 @@ def test_a_sweep_gives_table_and_page(tmp_path: Path):
     assert list(found.plot()) == ["obstacle_free"]
 
 
+@pytest.mark.usefixtures("no_workers")
 def test_a_sweep_counts_the_runs_with_warnings(tmp_path: Path):
     """Of two cells with two runs each one is too fast, in the terminal on one line."""
     plan = phonotaxis.SweepPlan(
@@ -284,6 +286,7 @@ def test_a_sweep_counts_the_runs_with_warnings(tmp_path: Path):
     assert "with warnings" in page
 
 
+@pytest.mark.usefixtures("no_workers")
 def test_a_comparison_counts_the_runs_with_warnings(tmp_path: Path):
     """Under the laws that have a guard."""
     body = CART | {"speed_m_s": 2.0, "acceleration_m_s2": 0.9}
@@ -314,6 +317,7 @@ def test_a_text_is_not_read_letter_by_letter(options, message, tmp_path: Path):
         phonotaxis.compare("wall", **options, out=tmp_path / "out")
 
 
+@pytest.mark.usefixtures("no_workers")
 def test_a_comparison_gives_rates_and_pairs(tmp_path: Path):
     found = phonotaxis.compare(
         "two_static_obstacles",
@@ -336,10 +340,7 @@ def test_stability_gives_findings_and_a_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """The first parts alone: all of them take a minute."""
-    monkeypatch.setattr(
-        report_parts, "parts_for", lambda _: report_parts.SOUND_PARTS[:2]
-    )
-    told: list[str] = []
+    monkeypatch.setattr(report_parts, "parts_for", lambda _: [])
     for laws, names in (
         ("all", ["conventional", "active", "conventional2017", "active2017"]),
         ("conventional,active", ["conventional", "active"]),
@@ -348,6 +349,9 @@ def test_stability_gives_findings_and_a_page(
     ):
         by_name = phonotaxis.stability("obstacle_free", laws=laws)
         assert [each.law for each in by_name.analyses] == names
+    first = report_parts.SOUND_PARTS[:2]
+    monkeypatch.setattr(report_parts, "parts_for", lambda _: first)
+    told: list[str] = []
     found = phonotaxis.stability("obstacle_free", progress=told.append)
     assert repr(found) == "<StabilityResult obstacle_free: active>"
     assert len(told) == 2

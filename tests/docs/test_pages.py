@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -11,8 +13,9 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
+import phonotaxis
 from diagrams.scenario.scenario import scenario_from_mapping
-from docs.building.page_code import page_blocks, page_file
+from docs.building.page_code import Block, page_blocks, page_file
 
 PAGES = (
     "first_run.md",
@@ -44,23 +47,44 @@ def test_what_the_page_shows_works(
     """In its order, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     namespace: dict[str, Any] = {"__name__": page}
     blocks = page_blocks(page)
     assert blocks
+    has_modules = any(block.file.endswith(".py") for block in blocks)
     for block in blocks:
         if block.file:
             (tmp_path / block.file).write_text(block.text, "utf-8")
         elif block.language == "python":
             exec(compile(block.text, page, "exec"), namespace)
+        elif has_modules or not (commands := plain_commands(block)):
+            run_in_shell(block)
         else:
-            lines = block.text.splitlines(keepends=True)
-            script = "".join(x for x in lines if not x.startswith(IN_A_CLONE))
-            done = subprocess.run(
-                ["bash", "-euc", script],
-                env=os.environ | {"PATH": programs},
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            assert done.returncode == 0, f"{script}\n{done.stdout}\n{done.stderr}"
+            for words in commands:
+                assert phonotaxis.main(words) == 0, words
+
+
+def plain_commands(block: Block) -> list[list[str]]:
+    """The arguments of each ``phonotaxis`` of a block that has nothing else, or none.
+
+    They run in the process of the tests. A process of its own takes 3 s to start, and
+    is for the pages on which the reader writes modules, and for pipes and files.
+    """
+    lines = block.text.replace("\\\n", " ").splitlines()
+    lines = [line for line in lines if not line.startswith(IN_A_CLONE)]
+    if any(re.search(r"[|<>&$;]|^(?!phonotaxis )", line) for line in lines):
+        return []
+    return [shlex.split(line)[1:] for line in lines]
+
+
+def run_in_shell(block: Block) -> None:
+    programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    lines = block.text.splitlines(keepends=True)
+    script = "".join(line for line in lines if not line.startswith(IN_A_CLONE))
+    done = subprocess.run(
+        ["bash", "-euc", script],
+        env=os.environ | {"PATH": programs},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, f"{script}\n{done.stdout}\n{done.stderr}"

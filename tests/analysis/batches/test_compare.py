@@ -160,6 +160,7 @@ def test_what_cannot_be_prepared_leaves_nothing(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("no_workers")
 @pytest.mark.slow
 def test_a_comparison_from_end_to_end(tmp_path):
     """Two laws on two short layouts; examples run again as they ran."""
@@ -212,6 +213,7 @@ def called(names: list[str]) -> dict[str, SweepPlan]:
     }
 
 
+@pytest.mark.usefixtures("no_workers")
 @pytest.mark.slow
 def test_scenarios_that_are_called_like_results(tmp_path):
     """No run and no file is lost."""

@@ -11,6 +11,8 @@ import analysis.batches.sweep as sweeps
 from analysis.batches.plan import SweepPlan
 from analysis.batches.sweep import prepare_sweep
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 LAWS = """
 def wordy(c, s, laws):
     return 2.0 / float(str(c))

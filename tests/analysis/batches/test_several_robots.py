@@ -11,6 +11,7 @@ from analysis.batches.sweep import prepare_sweep
 from diagrams import load_scenario, simulate
 
 
+@pytest.mark.usefixtures("no_workers")
 def test_rows_and_pages_have_each_robots_own(tmp_path):
     """Head on and nothing to avoid with: both touch, each the other."""
     settings = {

@@ -113,6 +113,7 @@ def test_two_comparisons_never_share_a_directory(tmp_path, monkeypatch):
         prepared.sweeps["wall"].store.close()
 
 
+@pytest.mark.usefixtures("no_workers")
 def test_a_comparison_of_which_nothing_ran_says_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "failing_law.py").write_text(
