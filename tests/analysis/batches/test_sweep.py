@@ -312,7 +312,7 @@ def test_a_run_that_fails_is_recorded_and_the_rest_goes_on(tmp_path, laws):
 def test_a_run_that_kills_its_process_is_recorded(tmp_path, laws):
     laws_used = ["sweep_laws:deadly", "sweep_laws:mortal", "active"]
     sweep = prepare_sweep(
-        plan(grid={"law": laws_used}, runs=1), tmp_path / "out", workers=2
+        plan(grid={"law": laws_used}, runs=1), tmp_path / "out", workers=1
     )
     table = sweep.run()
     assert list(table["cause"]) == ["failed", "completed", "completed"]

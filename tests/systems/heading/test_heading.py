@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from numba import njit
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
@@ -16,6 +15,7 @@ from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
 from systems import DiffDrivePlant, HeadingController, MagneticHeading, MotorDriver
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
+from systems.framework.compiling import njit
 from systems.heading import heading_controller
 from systems.heading.heading_controller import motor_duties
 from systems.heading.parameters import CompassParameters
@@ -119,7 +119,7 @@ def test_with_the_printed_duties_it_drives_backwards(monkeypatch):
 def duties(deviations, compiled=False):
     """(n, 2) at deviations that change as told, deg."""
     step = HeadingController().step
-    work = njit(step.step) if compiled else step.step
+    work = njit(step.step, cache=True) if compiled else step.step
     state, rows = np.array(step.state), []
     for tick, deviation in enumerate(deviations):
         expected, now = np.array([179.0]), np.array([179.0 - deviation])

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from phonotaxis.testing import evaluate, run
 from systems.framework.block import RunFacts
+from systems.framework.compiling import njit
 from systems.odor import airflow_sensors
 from systems.odor.airflow_sensors import AirflowSensors
 from systems.odor.gas_sensor_array import GasSensorArray
@@ -82,7 +82,9 @@ def in_drake(four, ticks):
 def compiled(steps, ticks):
     """The same from compiled steps, as a compiled loop calls them."""
     wind, plume, gas, air = steps
-    run_wind, run_plume, run_gas, run_air = (njit(step.step) for step in steps)
+    run_wind, run_plume, run_gas, run_air = (
+        njit(step.step, cache=True) for step in steps
+    )
     winds, puffs, ratios = (np.array(step.state) for step in steps[:3])
     rows: Any = []
     pose = np.array(POSE)

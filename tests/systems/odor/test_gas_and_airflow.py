@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from numba import njit
 
+from systems.framework.compiling import njit
 from systems.framework.faults import Fault
 from systems.odor import airflow_sensors
 from systems.odor.airflow_sensors import AirflowSensors
@@ -28,7 +28,7 @@ def ratios(levels, compiled=False, faults=(), **own):
     step = GasSensorArray(
         parameters=GasSensorParameters(**{**QUIET, **own}), faults=faults, seed=1
     ).step
-    work = njit(step.step) if compiled else step.step
+    work = njit(step.step, cache=True) if compiled else step.step
     state, rows = np.array(step.state), []
     for tick, level in enumerate(levels):
         plume = np.zeros(PLUME_SIZE)

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from numba import njit
 
+from systems.framework.compiling import njit
 from systems.radio.codec import FRAMES_SIZE
 from systems.radio.parameters import RadioParameters
 from systems.radio.radio_channel import AIR_SIZE, RadioChannel
@@ -26,7 +26,7 @@ def on_air(sent, compiled=False, **own):
     """(ticks,) bytes on the air after each tick in which robots a and b sent frames."""
     block = RadioChannel(parameters=RadioParameters(**own), robots=("a", "b"), seed=5)
     step = block.step
-    work = njit(step.step) if compiled else step.step
+    work = njit(step.step, cache=True) if compiled else step.step
     state, heard = np.array(step.state), []
     for tick, (first, second) in enumerate(sent):
         inputs = np.array(port(*first)), np.array(port(*second))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numba import njit
 
 from systems.base.robot import RobotParameters
+from systems.framework.compiling import njit
 from systems.framework.faults import Fault
 from systems.ranging.contact_switches import ContactSwitches
 
@@ -30,7 +30,7 @@ def felt(
         bodies=1,
         source_size=(0.1, width),
     )
-    work = njit(block.step.step) if compiled else block.step.step
+    work = njit(block.step.step, cache=True) if compiled else block.step.step
     inputs = tuple(map(np.array, (pose, box, size, followed)))
     outputs = np.zeros(2), np.zeros(1)
     work(4, np.zeros(0), inputs, outputs, block.step.numbers)

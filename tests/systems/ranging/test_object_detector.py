@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 
 from phonotaxis.testing import Bench
 from systems.base.robot import RobotParameters
+from systems.framework.compiling import njit
 from systems.ranging.beam_groups import EXTENT, NEAR_X, NEAR_Y, OPEN, group_beams
 from systems.ranging.object_detector import ObjectDetector, object_detector_step
 from systems.ranging.objects import KNOWN, RADIUS, THERE, VX, VY, X, Y
@@ -325,7 +325,7 @@ def test_no_more_than_eight_and_the_nearest():
 
 def test_drake_compiled_code_and_the_step_agree():
     sensors = ring(36)
-    compiled, plain = njit(object_detector_step), Driven(sensors)
+    compiled, plain = njit(object_detector_step, cache=True), Driven(sensors)
     at = Bench(
         plain.block,
         ranges=[2.0] * 36,

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from numba import njit
 
+from systems.framework.compiling import njit as cached_njit
+
 
 @pytest.fixture(scope="session")
 def compiled_tick() -> Callable[..., None]:
@@ -20,7 +22,7 @@ def compiled_tick() -> Callable[..., None]:
 
     def tick(step: Any, *arguments: Any) -> None:
         if step not in made:
-            compiled = njit(step)
+            compiled = cached_njit(step, cache=True)
 
             @njit
             def call(number, state, inputs, outputs, numbers):
