@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> Iterator[Table]:
 
 def following() -> Table:
     """What the robot hears and where it drives in ``obstacle_free``."""
-    result = simulate(load_scenario("obstacle_free"))
+    result = simulate(load_scenario("obstacle_free"), engine="compiled")
     metrics, source = run_metrics(result), result.scenario.source
     moving = result.time > _SETTLED_S
     moving &= result.time < source.path().length / source.speed_m_s
@@ -76,7 +76,10 @@ def endings(scenarios: tuple[str, ...] = SCENARIOS) -> Table:
 
     def rows() -> Iterator[list[str]]:
         for scenario in scenarios:
-            runs = (simulate(load_scenario(scenario, [f"law={x}"])) for x in FORCE_LAWS)
+            runs = (
+                simulate(load_scenario(scenario, [f"law={x}"]), engine="compiled")
+                for x in FORCE_LAWS
+            )
             yield [scenario, *map(_ending, runs)]
 
     names = ("no avoidance" if law == "none" else law for law in FORCE_LAWS)
@@ -85,7 +88,7 @@ def endings(scenarios: tuple[str, ...] = SCENARIOS) -> Table:
 
 def summary_of_the_default_run() -> Table:
     """What ``phonotaxis simulate`` prints, but for the speed and names of files."""
-    result = simulate(load_scenario("default"))
+    result = simulate(load_scenario("default"), engine="compiled")
     printed = run_text(result, run_document(result)).splitlines()
     lines = [[line] for line in printed if not line.startswith("speed")]
     return Table("summary of the default run", ("line",), lines)

@@ -16,14 +16,14 @@ CROSSING = (
 def crossing_run() -> RunResult:
     """A moving and a resting obstacle, cones, a moving source."""
     overrides = ["hearing=ideal", "duration_s=16", CROSSING]
-    return simulate(load_scenario("default", overrides))
+    return simulate(load_scenario("default", overrides), engine="compiled")
 
 
 @pytest.fixture(scope="session")
 def ideal_run() -> RunResult:
     """No cones."""
     overrides = ["hearing=ideal", "obstacle_sensing=ideal", "duration_s=6"]
-    return simulate(load_scenario("default", overrides))
+    return simulate(load_scenario("default", overrides), engine="compiled")
 
 
 @pytest.fixture(scope="session")
@@ -35,7 +35,7 @@ def collision_run() -> RunResult:
         "obstacles=[{name: box, size_m: [0.3, 0.3], waypoints_m: [[1.0, 0.1]]}]",
         "source.waypoints_m=[[3, 0]]",
     ]
-    return simulate(load_scenario("default", overrides))
+    return simulate(load_scenario("default", overrides), engine="compiled")
 
 
 @pytest.fixture(scope="session")
@@ -48,4 +48,4 @@ def shortest_run() -> RunResult:
 def guarded_run() -> RunResult:
     """A robot with a guard that stops it between two boxes."""
     overrides = ["hearing=ideal", "guard={}", "duration_s=8"]
-    return simulate(load_scenario("two_static_obstacles", overrides))
+    return simulate(load_scenario("two_static_obstacles", overrides), engine="compiled")

@@ -51,7 +51,7 @@ def run(words: str) -> RunResult:
         fields.get(option, "") + value
         for option, value in zip(options[::2], options[1::2], strict=True)
     ]
-    return simulate(load_scenario(scenario, overrides))
+    return simulate(load_scenario(scenario, overrides), engine="compiled")
 
 
 def mechanism(result: RunResult, metrics: dict[str, Any]) -> Any:

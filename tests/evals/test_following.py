@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 
 def test_following_error_settles_and_stays_bounded():
     """After the second burst, while the source moves at 0.3 m/s."""
-    result = simulate(load_scenario("obstacle_free"))
+    result = simulate(load_scenario("obstacle_free"), engine="drake")
     assert result.cause == "completed"
     columns = result.columns
     path = result.scenario.source.path()
@@ -33,7 +33,8 @@ def test_following_error_settles_and_stays_bounded():
 
 
 def test_estimates_are_where_the_source_is():
-    metrics = run_metrics(simulate(load_scenario("obstacle_free", ["duration_s=20"])))
+    scenario = load_scenario("obstacle_free", ["duration_s=20"])
+    metrics = run_metrics(simulate(scenario, engine="compiled"))
     assert metrics["detections_with_range"] == metrics["detections"] == 200
     assert metrics["frames_with_sound_heard"] == metrics["frames_with_sound"] == 200
     # The source moves 11 mm in the 37.5 ms that an estimate is old.
@@ -54,7 +55,8 @@ def test_tone_that_is_ambiguous_in_phase_gives_no_confident_wrong_target(tmp_pat
     sound = np.where(time < 0.25, chirp, tone)
     soundfile.write(tmp_path / "tone.wav", 0.5 * sound, 48000)
     overrides = ["sound.kind=wav", f"sound.file={tmp_path / 'tone.wav'}"]
-    result = simulate(load_scenario("obstacle_free", [*overrides, "duration_s=10"]))
+    scenario = load_scenario("obstacle_free", [*overrides, "duration_s=10"])
+    result = simulate(scenario, engine="compiled")
     columns = result.columns
     heard = np.r_[False, columns["detected"][:-1] > 0.5]
     error = np.hypot(
@@ -85,7 +87,8 @@ def test_a_jingle_that_is_heard_too_seldom_is_no_success(tmp_path):
     jingle = np.concatenate(notes)
     soundfile.write(tmp_path / "jingle.wav", 0.5 * jingle / np.ptp(jingle), 44100)
     overrides = ["sound.kind=wav", f"sound.file={tmp_path / 'jingle.wav'}"]
-    result = simulate(load_scenario("default", [*overrides, "duration_s=30"]))
+    scenario = load_scenario("default", [*overrides, "duration_s=30"])
+    result = simulate(scenario, engine="compiled")
     metrics = run_metrics(result)
     assert result.simulated_s == pytest.approx(30.0)
     figures = {name: float(x) for name, x in metrics.items() if x is not None}
@@ -99,7 +102,7 @@ def test_a_jingle_that_is_heard_too_seldom_is_no_success(tmp_path):
 @pytest.mark.parametrize("kind", ["band_noise", "horn"])
 def test_other_sounds_are_followed(kind):
     overrides = [f"sound.kind={kind}", "duration_s=20"]
-    result = simulate(load_scenario("obstacle_free", overrides))
+    result = simulate(load_scenario("obstacle_free", overrides), engine="compiled")
     distance = result.columns["source_range_true"]
     error = distance - result.scenario.follower.attraction.follow_distance_m
     assert np.max(np.abs(error[result.time > 2.5])) < 1.2

@@ -29,7 +29,7 @@ def test_the_robot_follows_as_in_the_free_field(room):
     empty: list[str] = []
     for overrides in (empty, room):
         scenario = load_scenario("obstacle_free", overrides)
-        result = simulate(scenario)
+        result = simulate(scenario, engine="compiled")
         assert result.cause == "completed"
         shares.append(float(run_metrics(result)["following_fraction"] or 0.0))
     free, reverberant = shares
@@ -41,6 +41,7 @@ def test_a_source_behind_is_found_within_two_bursts(room):
     right = []
     for seed in range(10):
         overrides = ["obstacles=[]", f"duration_s={BURST_ENDS_S[1]}", *behind(seed)]
-        result = simulate(load_scenario("default", [*overrides, *room]))
+        scenario = load_scenario("default", [*overrides, *room])
+        result = simulate(scenario, engine="compiled")
         right.append(on_the_right_side(result)[-1])
     assert np.count_nonzero(right) >= 9

@@ -15,7 +15,8 @@ pytestmark = pytest.mark.slow
 def test_share_of_ticks_at_or_above_mu_0(column, top_speed):
     """Of the ticks before the goal in which s is known."""
     setting = f"robot.top_speed_m_s={top_speed}"
-    result = simulate(load_scenario("two_static_obstacles", [setting]))
+    scenario = load_scenario("two_static_obstacles", [setting])
+    result = simulate(scenario, engine="compiled")
     s = result.columns["obstacle_speed_1"]
     inside = result.columns["source_range_true"] <= result.scenario.goal_radius_m
     known = (s > 0.0) & ~np.maximum.accumulate(inside)

@@ -20,7 +20,9 @@ from diagrams import RunResult, load_scenario, simulate
 
 @pytest.fixture(scope="module")
 def convoy() -> RunResult:
-    return simulate(load_scenario("convoy", ["hearing=ideal", "duration_s=8"]))
+    return simulate(
+        load_scenario("convoy", ["hearing=ideal", "duration_s=8"]), engine="compiled"
+    )
 
 
 def test_metrics_are_those_of_each_robot(convoy):

@@ -63,5 +63,7 @@ def test_empty_tracks_are_nowhere(run):
 
 
 def test_only_of_the_law_that_tracks():
-    unguarded = simulate(load_scenario("obstacle_free", ["hearing=ideal"]))
+    unguarded = simulate(
+        load_scenario("obstacle_free", ["hearing=ideal"]), engine="compiled"
+    )
     assert tracked_bodies(unguarded, [1.0]) is None
