@@ -119,7 +119,7 @@ def following_rows(
     for seed in range(1, runs + 1):
         for name, overrides in settings.items():
             scenario = load_scenario("obstacle_free", [*overrides, f"seed={seed}"])
-            result = simulate(scenario)
+            result = simulate(scenario, engine="compiled")
             metrics = run_metrics(result)
             following = metrics["following_fraction"] or 0.0
             if result.cause != "completed":
@@ -153,7 +153,7 @@ def behind_rows(
                     *overrides,
                 ],
             )
-            result = simulate(scenario)
+            result = simulate(scenario, engine="compiled")
             # A run that has reached the source ends; so does its target.
             ends = np.searchsorted(result.time, np.array(BURST_ENDS_S) - 1e-9)
             ends = np.minimum(ends, len(result.time) - 1)

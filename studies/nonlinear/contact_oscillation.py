@@ -142,7 +142,9 @@ def simulate_oscillation(
     Raises:
         InputError: The law is not known.
     """
-    result = simulate(_head_on_scenario(contact, term, start_m, duration_s))
+    result = simulate(
+        _head_on_scenario(contact, term, start_m, duration_s), engine="compiled"
+    )
     face = contact.scenario.only.robot.control_point_m + start_m
     clearances = face - result.columns["p_WP_x"]
     cycles = _cycles(result.time, clearances)

@@ -239,7 +239,7 @@ def _minima(case: Scenario, cell_m: float) -> list[tuple[float, float, str]]:
 
 def _end_of_run(case: Scenario) -> list[tuple[float, float, str]]:
     """Position of P at the end of a run, and the outcome."""
-    result = simulate(case)
+    result = simulate(case, engine="compiled")
     x, y = (float(result.columns[f"p_WP_{axis}"][-1]) for axis in "xy")
     if result.cause == "collision":
         return [(x, y, "collision")]
