@@ -44,23 +44,28 @@ def test_the_scenario_of_the_page_is_one() -> None:
 def test_what_the_page_shows_works(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In its order, in a folder of its own."""
+    """In its order, in a folder of its own; the reader's tests at the end, at once."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     namespace: dict[str, Any] = {"__name__": page}
     blocks = page_blocks(page)
     assert blocks
+    tests: list[str] = []
     has_modules = any(block.file.endswith(".py") for block in blocks)
     for block in blocks:
         if block.file:
             (tmp_path / block.file).write_text(block.text, "utf-8")
         elif block.language == "python":
             exec(compile(block.text, page, "exec"), namespace)
+        elif tested := re.fullmatch(r"python -m pytest -q (\S+)\n", block.text):
+            tests.append(tested[1])
         elif has_modules or not (commands := plain_commands(block)):
             run_in_shell(block)
         else:
             for words in commands:
                 assert phonotaxis.main(words) == 0, words
+    if tests:
+        run_in_shell(Block("sh", f"python -m pytest -q {' '.join(tests)}\n", ""))
 
 
 def plain_commands(block: Block) -> list[list[str]]:

@@ -51,8 +51,8 @@ def test_rate_counts_and_skips(two_boxes):
     assert sum(found["mechanisms"].values()) == found["collisions"]
     rate = trials.collision_rate
     assert rate.low <= rate.value == found["collisions"] / 8 <= rate.high
-    again = try_diagram(certificate, starts=8)
-    assert again.causes == trials.causes
+    again = try_diagram(certificate, starts=2)
+    assert again.causes == trials.causes[:2]
 
 
 @pytest.mark.parametrize(
