@@ -39,6 +39,7 @@ def test_the_scenario_of_the_page_is_one() -> None:
     assert [body.name for body in scenario.obstacles] == ["box", "cart"]
 
 
+@pytest.mark.usefixtures("no_workers")
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_what_the_page_shows_works(
@@ -51,16 +52,21 @@ def test_what_the_page_shows_works(
     blocks = page_blocks(page)
     assert blocks
     tests: list[str] = []
-    has_modules = any(block.file.endswith(".py") for block in blocks)
+    untried: set[str] = set()
     for block in blocks:
         if block.file:
             (tmp_path / block.file).write_text(block.text, "utf-8")
+            if block.file.endswith(".py"):
+                untried |= {block.file.removesuffix(".py")}
         elif block.language == "python":
             exec(compile(block.text, page, "exec"), namespace)
         elif tested := re.fullmatch(r"python -m pytest -q (\S+)\n", block.text):
             tests.append(tested[1])
-        elif has_modules or not (commands := plain_commands(block)):
+        elif (new := {name for name in untried if name in block.text}) or not (
+            commands := plain_commands(block)
+        ):
             run_in_shell(block)
+            untried -= new
         else:
             for words in commands:
                 assert phonotaxis.main(words) == 0, words
@@ -72,7 +78,7 @@ def plain_commands(block: Block) -> list[list[str]]:
     """The arguments of each ``phonotaxis`` of a block that has nothing else, or none.
 
     They run in the process of the tests. A process of its own takes 3 s to start, and
-    is for the pages on which the reader writes modules, and for pipes and files.
+    is for the first use of a module of the reader, and for pipes.
     """
     lines = block.text.replace("\\\n", " ").splitlines()
     lines = [line for line in lines if not line.startswith(IN_A_CLONE)]
