@@ -8,15 +8,15 @@ import pytest
 
 from analysis.loops.delay_margin import DELAY_PLACES, DelayedLoop
 from analysis.loops.delayed_run import check_delay_margin, simulate_delayed
-from analysis.loops.equilibria import follow_equilibrium
 from diagrams.scenario.scenario import Scenario
+from tests.operating_points import follow_point
 
 T = 0.025
 
 
 def rest(law="none", hold="motion"):
     scenario = {"law": law, "tracker": {"hold": hold}}
-    return follow_equilibrium(Scenario.model_validate(scenario))
+    return follow_point(Scenario.model_validate(scenario))
 
 
 @pytest.mark.slow

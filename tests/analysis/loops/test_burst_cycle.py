@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import expm
 
 from analysis.loops.burst_cycle import burst_cycle, simulate_burst_cycle
-from analysis.loops.equilibria import follow_equilibrium
 from diagrams.scenario.scenario import Scenario
+from tests.operating_points import follow_point
 
 M, K, D, T = 3.94, 2.0, 1.0, 0.025
 
@@ -67,7 +67,7 @@ def test_largest_multiplier_is_that_of_a_model_on_a_line(lag, hold):
 
 def test_world_hold_forgets_and_robot_hold_does_not():
     """The target at rest in W closes the loop by odometry all the time."""
-    point = follow_equilibrium(scenario())
+    point = follow_point(scenario())
     world, robot, motion = (
         burst_cycle(scenario(), hold, point=point)
         for hold in ("world", "robot", "motion")
@@ -80,7 +80,7 @@ def test_world_hold_forgets_and_robot_hold_does_not():
 
 
 def test_without_silence_robot_hold_is_a_tick_late():
-    point = follow_equilibrium(scenario())
+    point = follow_point(scenario())
     for hold in ("world", "robot"):
         found = burst_cycle(scenario(), hold, on_s=2.0, gap_s=0.0, point=point)
         assert found.largest == pytest.approx(sampled_line(0.05, hold, 80), abs=1e-3)

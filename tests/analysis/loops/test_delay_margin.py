@@ -18,18 +18,18 @@ from analysis.loops.delayed_run import (
     fitted_oscillation,
     simulate_delayed,
 )
-from analysis.loops.equilibria import follow_equilibrium
 from analysis.loops.ideal_loop import ideal_loop
 from analysis.loops.ideal_scenarios import ideal_scenario
 from analysis.loops.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams.scenario.scenario import Scenario
+from tests.operating_points import follow_point
 
 M, K, D, LAG, T = 3.94, 2.0, 1.0, 0.05, 0.025
 
 
 def rest(law="none", hold="motion", **data):
     data = {"law": law, "tracker": {"hold": hold}} | data
-    return follow_equilibrium(Scenario.model_validate(data))
+    return follow_point(Scenario.model_validate(data))
 
 
 def continuous_margin() -> float:

@@ -17,7 +17,6 @@ import control
 import numpy as np
 import pytest
 
-from analysis.loops.equilibria import follow_equilibrium
 from analysis.loops.frequency_levels import frequency_grid, peak
 from analysis.loops.gang_of_four import gang_of_four
 from analysis.loops.heading_loop import heading_loop, heading_loop_margins
@@ -29,6 +28,7 @@ from analysis.stability.requirements import Requirements
 from diagrams.scenario.scenario import Scenario
 from systems.base.robot import RobotParameters
 from systems.heading.parameters import MotorDriverParameters
+from tests.operating_points import follow_point
 
 # --- exact polynomials, lowest power first ---------------------------------------
 
@@ -428,7 +428,7 @@ def test_pictures_show_every_mode():
 
 
 def test_the_gang_of_four_has_its_peaks_in_the_picture():
-    gang = gang_of_four(follow_equilibrium(Scenario(law="active")))
+    gang = gang_of_four(follow_point(Scenario(law="active")))
     L = 1.0 / gang.S - 1.0
     np.testing.assert_allclose(gang.T, L / (1.0 + L), rtol=1e-9)
     fine = np.geomspace(0.3, 3.0, 20_001)

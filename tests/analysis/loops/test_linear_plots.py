@@ -10,11 +10,12 @@ from matplotlib.text import Annotation
 from analysis.loops import linear_plots
 from analysis.loops.contact_mode import contact_limits
 from analysis.loops.delayed_run import check_delay_margin
-from analysis.loops.equilibria import find_equilibria, follow_equilibrium
+from analysis.loops.equilibria import find_equilibria
 from analysis.loops.gang_of_four import gang_of_four
 from analysis.loops.loop_margins import all_margins
 from analysis.loops.step_response import check_step
 from diagrams.scenario.scenario import Scenario
+from tests.operating_points import follow_point
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def scenario():
 
 @pytest.fixture(scope="module")
 def point(scenario):
-    return follow_equilibrium(scenario)
+    return follow_point(scenario)
 
 
 @pytest.fixture(scope="module")

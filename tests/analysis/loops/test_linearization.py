@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 import pytest
 
 from analysis.loops import linearization
-from analysis.loops.equilibria import follow_equilibrium
 from analysis.loops.ideal_loop import ideal_loop
 from analysis.loops.linearization import (
     blockwise_model,
@@ -22,6 +22,7 @@ from analysis.loops.linearization import (
 )
 from analysis.loops.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams.scenario.scenario import Scenario
+from tests.operating_points import follow_point
 
 pytestmark = pytest.mark.drake
 
@@ -32,9 +33,10 @@ def made(**fields: Any) -> Any:
     return SimpleNamespace(**fields)
 
 
+@cache
 def points(law):
     scenario = Scenario(law=law)
-    return [follow_equilibrium(scenario), moving_equilibrium(scenario)]
+    return [follow_point(scenario), moving_equilibrium(scenario)]
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -56,7 +58,7 @@ def test_signals_of_both_routes_are_the_same():
 
 def test_P_lies_175_mm_ahead_of_a_robot_that_looks_aside():
     aside = {"law": "none", "source": {"waypoints_m": [[1.5, 1.5]]}}
-    point = follow_equilibrium(Scenario.model_validate(aside))
+    point = follow_point(Scenario.model_validate(aside))
     pose = point.loop.indices("plant")[:3]
     across = 0.175 * np.array([-np.sin(point.theta_WB), np.cos(point.theta_WB)])
     expected = [[1.0, 0.0, across[0]], [0.0, 1.0, across[1]], [0.0, 0.0, 1.0]]

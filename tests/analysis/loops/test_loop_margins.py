@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from analysis.loops.equilibria import follow_equilibrium
 from analysis.loops.linear_models import LinearModel
 from analysis.loops.loop_margins import all_margins, loop_margins
 from analysis.loops.margin_results import DiskMargin
 from analysis.loops.open_loops import closed, cut_model, open_loop, target_loop
 from analysis.loops.operating_points import moving_equilibrium
 from diagrams.scenario.scenario import Scenario
+from tests.operating_points import follow_point
 
 M, K, D = 3.94, 2.0, 1.0
 
@@ -205,7 +205,7 @@ def test_an_unstable_loop_stands_nothing():
 
 
 def test_sampled_margins_are_those_of_control():
-    model = open_loop(follow_equilibrium(Scenario(law="none")), "actuator")
+    model = open_loop(follow_point(Scenario(law="none")), "actuator")
     ours = loop_margins(model)
     system = control.ss(model.A, model.B, model.C, model.D, dt=model.period_s)
     _, phase, modulus, _, crossover, _ = control.stability_margins(system, method="frd")
@@ -216,7 +216,7 @@ def test_sampled_margins_are_those_of_control():
 
 def test_lag_and_latency_eat_margin():
     """At the actuator: half a tick of hold, half of integration, 50 ms of lag."""
-    point = follow_equilibrium(Scenario(law="none"))
+    point = follow_point(Scenario(law="none"))
     real = loop_margins(open_loop(point, "actuator"))
     ideal = loop_margins(target_loop(Scenario(), "actuator"))
     lost = math.radians(ideal.phase_margin_deg - real.phase_margin_deg)
@@ -229,7 +229,7 @@ def test_lag_and_latency_eat_margin():
 @pytest.mark.parametrize("law", ["none", "active"])
 def test_cut_loops_close_to_the_closed_loop(law, moving):
     scenario = Scenario(law=law)
-    point = moving_equilibrium(scenario) if moving else follow_equilibrium(scenario)
+    point = moving_equilibrium(scenario) if moving else follow_point(scenario)
     whole = point.loop.period_derivatives(point.state, point.time_s).A
     for places in (("sensor",), ("actuator",), ("wheels",), ("sensor", "wheels")):
         cut = cut_model(point, *places)
@@ -244,7 +244,7 @@ def cuts():
     """Of each law: its operating point, and each cut loop with its margins."""
     found = {}
     for law in LAWS:
-        point = follow_equilibrium(Scenario(law=law))
+        point = follow_point(Scenario(law=law))
         loops = [(m, open_loop(point, m.at, m.direction)) for m in all_margins(point)]
         found[law] = point, loops
     return found
@@ -373,7 +373,7 @@ def test_simulated_bearings_that_shrink_grow_below_the_margin_only(cuts, share):
 
 
 def test_several_signals_have_no_margins():
-    point = follow_equilibrium(Scenario(law="none"))
+    point = follow_point(Scenario(law="none"))
     with pytest.raises(ValueError, match=r"2 inputs.*part"):
         loop_margins(cut_model(point, "sensor"))
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from analysis.loops.equilibria import follow_equilibrium
 from analysis.loops.gang_of_four import gang_of_four
 from analysis.loops.loop_margins import loop_margins
 from analysis.loops.open_loops import open_loop
 from analysis.loops.step_response import check_step, fitted_step
 from diagrams.scenario.scenario import Scenario
+from tests.operating_points import follow_point
 
 
 @pytest.mark.parametrize("law", ["none", "conventional", "active"])
@@ -76,7 +76,7 @@ def test_overdamped_attraction_has_no_oscillation_to_compare():
 
 @pytest.mark.parametrize("law", ["none", "active"])
 def test_gang_of_four_is_consistent_with_the_loop(law):
-    point = follow_equilibrium(Scenario(law=law))
+    point = follow_point(Scenario(law=law))
     gang = gang_of_four(point)
     model = open_loop(point, "sensor")
     L = model.response(gang.omega)[0, 0]
@@ -88,5 +88,5 @@ def test_gang_of_four_is_consistent_with_the_loop(law):
 
 def test_a_steady_push_moves_p_by_its_force_over_the_stiffness():
     """At low frequency PS is M / K_r in the other direction: hearing sees it."""
-    gang = gang_of_four(follow_equilibrium(Scenario(law="none")))
+    gang = gang_of_four(follow_point(Scenario(law="none")))
     assert abs(gang.PS[0]) == pytest.approx(3.94 / 2.0, rel=1e-3)

@@ -20,6 +20,7 @@ from analysis.loops.step_response import check_step
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from tests.block_forces import block_force
+from tests.operating_points import follow_point
 
 M, K, D, LAG = 3.94, 2.0, 1.0, 0.05
 TICKS_S = (0.0125, 0.05)
@@ -65,7 +66,7 @@ def test_target_motion_is_the_matrix_exponentials(tick_s):
 
     To the error of the integrator, which the wheels' own pole shows most.
     """
-    at = follow_equilibrium(scenario(tick_s))
+    at = follow_point(scenario(tick_s))
     own = np.log(np.linalg.eigvals(held_over_a_tick(K, tick_s)).astype(complex))
     for pole in own / tick_s:
         error = 1e-5 if abs(pole) < 1.0 else 0.2
@@ -80,7 +81,7 @@ def test_poles_tend_to_those_of_continuous_time():
     """To first order in the tick, since what is held is half a tick old."""
 
     def off(tick_s: float) -> float:
-        at = follow_equilibrium(scenario(tick_s))
+        at = follow_point(scenario(tick_s))
         slow = continuous_model(at).poles
         slow = slow[np.abs(slow.imag) > 0.5]
         return float(np.abs(at.eigenvalues[:, None] - slow).min(axis=0).max())
@@ -98,7 +99,7 @@ def test_step_of_the_diagram_decays_as_predicted(tick_s):
 @pytest.mark.parametrize("tick_s", [0.05, pytest.param(0.0125, marks=pytest.mark.long)])
 def test_delay_margin_is_where_the_diagram_begins_to_grow(tick_s):
     """A spring of 8 N/m leaves little damping, so that growth shows soon."""
-    at = follow_equilibrium(scenario(tick_s, attraction={"stiffness_n_m": 8.0}))
+    at = follow_point(scenario(tick_s, attraction={"stiffness_n_m": 8.0}))
     assert check_delay_margin(at, "wheels", duration_s=60.0).confirmed
     # That of the cut loop counts the phase at one frequency, and holds nearly.
     margin = delay_margin(at, "wheels")

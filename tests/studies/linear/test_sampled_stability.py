@@ -9,7 +9,6 @@ import pytest
 
 from analysis.loops.burst_cycle import burst_cycle
 from analysis.loops.contact_mode import contact_model, largest_contact_stiffness
-from analysis.loops.equilibria import follow_equilibrium
 from diagrams.scenario.scenario import Scenario
 from studies.linear.burst_gaps import gap_chart
 from studies.linear.root_locus import root_loci
@@ -19,6 +18,7 @@ from studies.linear.sampled_stability import (
     gain_delay_chart,
     poles_against_period,
 )
+from tests.operating_points import follow_point
 
 M, K, D, T, LAG = 3.94, 2.0, 1.0, 0.025, 0.05
 
@@ -39,7 +39,7 @@ def test_longest_stable_period_is_the_held_velocity_conditions():
 
 
 def test_poles_at_todays_period_are_those_of_the_operating_point():
-    point = follow_equilibrium(Scenario(law="none"))
+    point = follow_point(Scenario(law="none"))
     found = poles_against_period(Scenario(), periods_s=[T])
     slow = np.log(found.poles[0][np.abs(found.poles[0]) > 0.7]) / T
     for pole in slow:
@@ -102,7 +102,7 @@ def test_delay_charts_boundary_is_the_delay_margin_of_the_attraction():
 
 def test_gap_chart_is_the_burst_cycle_of_each_gap():
     scenario = Scenario(law="none")
-    point = follow_equilibrium(scenario)
+    point = follow_point(scenario)
     chart = gap_chart(
         scenario, gaps_s=[0.5, 1.5], holds=["robot", "world"], point=point
     )
