@@ -115,7 +115,6 @@ def burst_cycle(
     whole number of control periods or has no sound, or if there is no stable
     equilibrium.
     """
-    point = point or follow_equilibrium(scenario)
     sound = scenario.source.sound
     on = sound.on_s if on_s is None else on_s
     gap = sound.period_s - sound.on_s if gap_s is None else gap_s
@@ -127,6 +126,7 @@ def burst_cycle(
             f"{on:g} s of sound and {gap:g} s of silence are not a cycle of whole "
             f"ticks; give multiples of {tick_s} s, and some sound",
         )
+    point = point or follow_equilibrium(scenario)
     loop = ideal_loop(_with_bursts(point.loop.scenario, hold, on, on + gap))
     state = _settled(loop, point, round(ticks))
     matrices = _matrices(loop, state, round(ticks))

@@ -61,7 +61,8 @@ def test_this_models_continuous_limit_is_the_design_notes():
 @pytest.mark.parametrize("lag", [0.01, 0.05])
 @pytest.mark.parametrize("hold", ["world", "robot"])
 def test_largest_multiplier_is_that_of_a_model_on_a_line(lag, hold):
-    found = burst_cycle(scenario(plant={"motor_lag_s": lag}), hold)
+    case = scenario(plant={"motor_lag_s": lag})
+    found = burst_cycle(case, hold, point=follow_point(case))
     assert found.largest == pytest.approx(sampled_line(lag, hold), abs=2e-3)
 
 
@@ -88,7 +89,7 @@ def test_without_silence_robot_hold_is_a_tick_late():
 
 @pytest.mark.parametrize("hold", ["world", "robot"])
 def test_simulation_shows_the_largest_multiplier(hold):
-    cycle = burst_cycle(scenario(), hold)
+    cycle = burst_cycle(scenario(), hold, point=follow_point(scenario()))
     run = simulate_burst_cycle(cycle, 24)
     assert run.factor == pytest.approx(cycle.largest, rel=5e-3)
 
@@ -96,7 +97,8 @@ def test_simulation_shows_the_largest_multiplier(hold):
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", ["along", "across"])
 def test_simulation_with_the_active_law_shows_both_directions(direction):
-    cycle = burst_cycle(scenario(law="active"), "robot")
+    case = scenario(law="active")
+    cycle = burst_cycle(case, "robot", point=follow_point(case))
     run = simulate_burst_cycle(cycle, 24, direction=direction)
     largest = abs(getattr(cycle, direction)[0])
     assert run.factor == pytest.approx(largest, rel=0.05)

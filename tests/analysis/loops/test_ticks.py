@@ -109,7 +109,8 @@ def test_delay_margin_is_where_the_diagram_begins_to_grow(tick_s):
 
 @pytest.mark.parametrize("tick_s", TICKS_S)
 def test_burst_cycle_is_that_of_a_simulated_run(tick_s):
-    cycle = burst_cycle(scenario(tick_s), "robot")
+    case = scenario(tick_s)
+    cycle = burst_cycle(case, "robot", point=follow_point(case))
     assert cycle.matrices.shape[0] == round(cycle.period_s / tick_s)
     run = simulate_burst_cycle(cycle, 20)
     assert run.time_s[-1] == pytest.approx(20 * cycle.period_s)
