@@ -109,6 +109,7 @@ def clock_drift(
     p_AM: NDArray[np.float64],
     c: float,
     channels: Sequence[int] | None = None,
+    memory: MisfitMemory | None = None,
 ) -> ChannelFault | None:
     """Finds channels whose delays leave those of any source further and further.
 
@@ -119,6 +120,7 @@ def clock_drift(
     shape (k, n - 1), and ``t_s`` are the middles of the stretches. ``p_AM`` contains
     the positions of all microphones, m. If the n channels are not all channels,
     ``channels`` lists their numbers from 0.
+    Calls with the same microphones and mostly the same delays may share a ``memory``.
     """
     numbers = list(range(len(p_AM)) if channels is None else channels)
     places = p_AM[numbers]
@@ -127,7 +129,7 @@ def clock_drift(
     t_s, lags = t_s[heard], lags[heard]
     if len(t_s) < _LEAST or t_s[-1] - t_s[0] < _LEAST_S:
         return None
-    misfits = wave_front_misfits(lags, places, c)
+    misfits = (memory or MisfitMemory()).misfits(lags, places, c)
     # The delays may leave those of a source only in the second half of the time.
     parts = (misfits, misfits[-max(_LEAST, len(t_s) // 2) :])
     leaves = any(_leaves(part, places, c) for part in parts)
@@ -161,6 +163,24 @@ def clock_drift(
             "clock to be sure",
         )
     return None
+
+
+class MisfitMemory:
+    """Remembers the misfits of the last delays, because they take long to compute."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, NDArray[np.float64]] = {}
+
+    def misfits(
+        self, lags: NDArray[np.float64], places: NDArray[np.float64], c: float
+    ) -> NDArray[np.float64]:
+        """Computes ``wave_front_misfits`` for rows of delays that are not known yet."""
+        keys = [row.tobytes() for row in lags]
+        new = [k for k, key in enumerate(keys) if key not in self._known]
+        found = wave_front_misfits(lags[new], places, c)
+        known = self._known | dict(zip([keys[k] for k in new], found, strict=True))
+        self._known = {key: known[key] for key in keys}
+        return np.array([known[key] for key in keys])
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,12 @@ from analysis.arrays.channel_changes import (
 from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.channel_faults import find_channel_faults
 from analysis.arrays.channel_timing import LagSearch
-from analysis.arrays.clock_drift import STRETCH_S, clock_drift, common_lags
+from analysis.arrays.clock_drift import (
+    STRETCH_S,
+    MisfitMemory,
+    clock_drift,
+    common_lags,
+)
 
 # _CLIPPED: magnitude that counts as full scale.
 # _CLIPPED_SHARE: a channel is clipped if at least this share of its samples is at full
@@ -91,6 +96,7 @@ class LiveFaults:
             if len(self._alive) > 2
             else None
         )
+        self._misfits = MisfitMemory()
         self._pending: Future[list[ChannelFault]] | None = None
         self._next, self._due = self._count + _TOGETHER, 0
 
@@ -187,7 +193,9 @@ class LiveFaults:
         times = np.array([t for t, _ in chosen])
         lags = np.array([lag for _, lag in chosen])
         places = self._known.shape.p_AM
-        fault = clock_drift(times, lags, places, self._known.c, self._alive)
+        fault = clock_drift(
+            times, lags, places, self._known.c, self._alive, self._misfits
+        )
         if fault is not None:
             yield fault
 
