@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from analysis.arrays.channel_fault import ChannelFault, channel_names
 from analysis.arrays.channel_timing import LagSearch
+from analysis.arrays.known_medians import known_medians
 
 # _STRETCH_S: shortest and longest stretch, s.
 # _STRETCHES: number of stretches in a recording, as far as this range allows.
@@ -182,7 +183,7 @@ def _time_of(jump: _Jump, delays: ChannelDelays) -> float | None:
     middle = 0.5 * (jump.before + jump.after)[jump.across]
     side = np.sign(jump.after - jump.before)[jump.across]
     near = min(0.5 * abs(jump.step_s), 0.25 * abs(jump.step_s) + _ROOM_S)
-    is_after = np.nanmedian((lags - middle) * side, axis=1) > 0.0
+    is_after = known_medians((lags - middle) * side, axis=1) > 0.0
     # The best split has the most stretches on the right sides.
     wrong = np.cumsum(np.where(is_after, 1, -1))
     if len(lags) < 2 * _LEAST:
@@ -193,7 +194,7 @@ def _time_of(jump: _Jump, delays: ChannelDelays) -> float | None:
         lags - jump.after[jump.across],
         lags - jump.before[jump.across],
     )
-    kept = np.nanmedian(np.abs(off), axis=1) < near
+    kept = known_medians(np.abs(off), axis=1) < near
     if min(kept[: k + 1].mean(), kept[k + 1 :].mean()) < _KEPT:
         return None
     return 0.5 * float(times[k] + times[k + 1])
@@ -316,25 +317,13 @@ def _next_medians(
     number = np.minimum(heard.sum(axis=0) - skipped, _MANY)
     following = sliding_window_view(packed, _MANY, axis=0)
     following = following[skipped, np.arange(lags.shape[1])]
-    middles = _medians(following, number)
-    scatter = _medians(np.abs(following - middles[:, :, np.newaxis]), number)
+    middles = known_medians(following)
+    scatter = known_medians(np.abs(following - middles[:, :, np.newaxis]))
     # The error of a median of n values is 1.25 times that of their mean.
     errors = 1.25 * np.maximum(1.4826 * scatter, _FLOOR_SAMPLES / rate)
     errors /= np.sqrt(np.maximum(number, 1))
     enough = number >= _LEAST
     return np.where(enough, middles, np.nan), np.where(enough, errors, np.nan)
-
-
-def _medians(
-    values: NDArray[np.float64], number: NDArray[np.intp]
-) -> NDArray[np.float64]:
-    """Returns the medians of ``number`` values along the last axis; the rest is NaN."""
-    ordered = np.sort(values, axis=-1)
-    low, high = (
-        np.take_along_axis(ordered, k[..., np.newaxis], axis=-1)[..., 0]
-        for k in (np.maximum(number - 1, 0) // 2, number // 2)
-    )
-    return np.asarray(0.5 * (low + high))
 
 
 def _wave_explains(

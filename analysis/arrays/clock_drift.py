@@ -23,6 +23,7 @@ from scipy import fft
 from scipy.stats import theilslopes
 
 from analysis.arrays.channel_fault import ChannelFault
+from analysis.arrays.known_medians import known_medians
 from analysis.arrays.wave_fronts import wave_front_misfits
 from systems.delays.correlations import correlations_at_lags
 
@@ -246,9 +247,7 @@ def _without_echoes(
     """
     padded = np.pad(lags, ((_BESIDE, _BESIDE), (0, 0)), constant_values=np.nan)
     windows = sliding_window_view(padded, 2 * _BESIDE + 1, axis=0)
-    known = np.asarray(np.isfinite(windows).any(axis=2, keepdims=True))
-    usual = np.nanmedian(np.where(known, windows, 0.0), axis=2)
-    off = np.abs(lags - usual)
+    off = np.abs(lags - known_medians(windows))
     return np.where(off < 2.0 * allowed_s + _GROWTH_S, lags, np.nan)
 
 
@@ -272,7 +271,7 @@ def _leaves(
     along = growth[known] / size
     halfway = float((thirds[1] - thirds[0])[known] @ along) / size
     scatter = max(
-        float(np.nanmedian(np.abs((part - middle)[:, known] @ along)))
+        float(known_medians(np.abs((part - middle)[:, known] @ along)))
         for part, middle in zip(np.array_split(misfits, 3), thirds, strict=True)
     )
     return _HALFWAY < halfway < 1.0 - _HALFWAY and scatter < _SCATTER * size
@@ -281,8 +280,7 @@ def _leaves(
 def _median(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the medians of columns; NaN for a column with fewer than 3 numbers."""
     known = np.isfinite(values).sum(axis=0) >= 3
-    filled = np.where(known, values, 0.0)
-    return np.where(known, np.nanmedian(filled, axis=0), np.nan)
+    return np.where(known, known_medians(values, axis=0), np.nan)
 
 
 def _names(channels: Sequence[int]) -> str:
