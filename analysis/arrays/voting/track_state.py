@@ -60,7 +60,8 @@ class TrackParameters(Parameters):
     resolution_deg: float = Field(default=20.0, gt=0.0, le=90.0)
     """Angle below which two sources may give only one detection, deg."""
     begins_after_s: Positive = 0.25
-    """Least age of a track that is reported, s."""
+    """Least age of a track that is reported, s. While another source sounds, the least
+    age is twice as long."""
     least_share: Fraction = 0.25
     """Least share of the heard sound for the first detection of a track. The mean share
     of its detections must also be at least this value when the track is reported, and
@@ -179,7 +180,9 @@ def heard(
     track: SourceTrack, detection: VotedSource, t_s: float, p: TrackParameters
 ) -> SourceTrack:
     """Returns a track after a step with a detection of it."""
+    # The louder other sources are, the more they shift a detection.
     of_detection = scatter(track, detection, p)
+    of_detection *= max(1.0, track.share / max(detection.share, 0.01)) ** 2
     C, rate = track.covariance, track.rate
     if detection.rate:
         # The rate of a source that turns fast is measured as well.
