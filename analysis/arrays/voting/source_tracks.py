@@ -31,6 +31,7 @@ from analysis.arrays.voting.track_state import (
     apart_rad,
     born,
     heard,
+    innovation,
     missed,
     predicted,
     scatter,
@@ -149,8 +150,8 @@ def _assigned(
     cost = np.empty((len(tracks), len(detections)))
     for i, track in enumerate(tracks):
         for k, d in enumerate(detections):
-            variance = float(track.covariance[0, 0]) + scatter(track, d, p)
-            off = wrapped(d.bearing - track.bearing)
+            off, variance = innovation(track, d)
+            variance += scatter(track, d, p)
             # Reported tracks have priority, so that a new track does not take their
             # detections.
             late = 0.0 if track.identity else 4.0
