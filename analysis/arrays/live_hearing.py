@@ -140,6 +140,8 @@ class LiveHearing:
         try:
             for block in self._stream.blocks:
                 channels = self._accepted(block, looks)
+                for fault in looks.look(channels):
+                    self._mend(fault, looks)
                 alive = channels[self._alive]
                 powers.append(float(np.mean(np.square(alive))) if alive.size else 0.0)
                 steps, self._memory = hear_sources(
@@ -152,8 +154,8 @@ class LiveHearing:
                     told = replace(step, unfit=doubted)
                     yield HeardStep(told, 10.0 * math.log10(power))
                     powers.clear()
-                # Lines do not wait for the examination of their sound.
-                for fault in looks.look(channels):
+                # Lines do not wait for the comparison of the channels.
+                for fault in looks.compare():
                     self._mend(fault, looks)
             for fault in looks.finish():
                 self._mend(fault, looks)

@@ -36,7 +36,6 @@ from analysis.arrays.voting.track_state import (
     predicted,
     scatter,
 )
-from analysis.arrays.voting.vote_bearings import wrapped
 from analysis.arrays.voting.vote_peaks import VotedSource
 
 # Largest angle between a detection and its track, rad.
