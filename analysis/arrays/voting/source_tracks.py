@@ -193,7 +193,7 @@ def _hidden(
 def _is_told(
     track: SourceTrack, t_s: float, least_s: float, p: TrackParameters
 ) -> bool:
-    old = t_s - track.t_born >= least_s - 1e-9
+    old = track.t_heard == t_s and t_s - track.t_born >= least_s - 1e-9
     loud = track.share >= p.least_share
     return old and loud and track.hits >= p.least_hits and track.confidence > 0.9
 
