@@ -15,11 +15,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from analysis.arrays.channel_fault import ChannelFault, channel_names
 from analysis.arrays.channel_timing import LagSearch
+from analysis.arrays.known_medians import known_medians
 
 # _STRETCH_S: shortest and longest stretch, s.
 # _STRETCHES: number of stretches in a recording, as far as this range allows.
@@ -151,11 +152,7 @@ def dying_channel(
 
 def slipping_channels(delays: ChannelDelays, search: LagSearch) -> ChannelFault | None:
     """Finds channels whose delays all jump by the same amount at one time."""
-    jumps = [
-        jump
-        for split in range(_LEAST, len(delays.t_s) - _LEAST + 1)
-        if (jump := _jump_at(split, delays, search)) is not None
-    ]
+    jumps = _jumps(delays.lags, search)
     if not jumps:
         return None
     jump = max(jumps, key=lambda jump: jump.significance)
@@ -186,7 +183,7 @@ def _time_of(jump: _Jump, delays: ChannelDelays) -> float | None:
     middle = 0.5 * (jump.before + jump.after)[jump.across]
     side = np.sign(jump.after - jump.before)[jump.across]
     near = min(0.5 * abs(jump.step_s), 0.25 * abs(jump.step_s) + _ROOM_S)
-    is_after = np.nanmedian((lags - middle) * side, axis=1) > 0.0
+    is_after = known_medians((lags - middle) * side, axis=1) > 0.0
     # The best split has the most stretches on the right sides.
     wrong = np.cumsum(np.where(is_after, 1, -1))
     if len(lags) < 2 * _LEAST:
@@ -197,7 +194,7 @@ def _time_of(jump: _Jump, delays: ChannelDelays) -> float | None:
         lags - jump.after[jump.across],
         lags - jump.before[jump.across],
     )
-    kept = np.nanmedian(np.abs(off), axis=1) < near
+    kept = known_medians(np.abs(off), axis=1) < near
     if min(kept[: k + 1].mean(), kept[k + 1 :].mean()) < _KEPT:
         return None
     return 0.5 * float(times[k] + times[k + 1])
@@ -214,24 +211,66 @@ class _Jump(NamedTuple):
     """(p,) whether a pair jumps."""
 
 
-def _jump_at(split: int, delays: ChannelDelays, search: LagSearch) -> _Jump | None:
-    """Returns the jump before the stretch ``split``."""
-    rate, pairs, count = search.sample_rate_hz, search.pairs, search.shape.count
-    before, std_before = _middles(delays.lags[:split][::-1], rate)
-    after, std_after = _middles(delays.lags[split:], rate)
+def _jumps(lags: NDArray[np.float64], search: LagSearch) -> list[_Jump]:
+    """Returns the jumps of (s, p) delays that are faults, each with its neighbors."""
+    rate, count = search.sample_rate_hz, search.shape.count
+    if count < 3:
+        return []
+    splits = slice(_LEAST, len(lags) - _LEAST + 1)
+    before, std_before = (x[::-1][splits] for x in _next_medians(lags[::-1], rate))
+    after, std_after = (x[splits] for x in _next_medians(lags, rate))
     change, std = after - before, np.hypot(std_before, std_after)
     known = np.isfinite(change)
-    if not known.any() or count < 3:
-        return None
-    size = float(np.abs(change[known]).max())
+    size = np.max(np.abs(change), axis=1, keepdims=True, initial=0.0, where=known)
     error = np.minimum(_SHARE * size, _STILL * search.allowed_s) + _WITHIN * std
     stays = known & (np.abs(change) <= error)
-    graph = np.zeros((count, count))
-    graph[tuple(pairs[stays].T)] = 1.0
-    number, group = connected_components(graph, directed=False)
-    if number != 2 or size < _LEAST_SAMPLES / rate:
-        return None
-    first = group == group[0]
+    first, two = _two_groups(stays, search.pairs, count)
+    found = (
+        _jump_between(before[k], after[k], std[k], error[k], first[k], search)
+        for k in np.flatnonzero(two & (size[:, 0] >= _LEAST_SAMPLES / rate))
+    )
+    return [jump for jump in found if jump is not None]
+
+
+def _two_groups(
+    joined: NDArray[np.bool_], pairs: NDArray[np.intp], count: int
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Returns the group of channel 0, and whether there is exactly one other group.
+
+    In each of s rows, (s, p) ``joined`` pairs of channels are in the same group. The
+    results have the shapes (s, n) and (s,).
+    """
+    reached = np.tile(np.eye(count, dtype=np.float32), (len(joined), 1, 1))
+    i, j = pairs.T
+    reached[:, i, j] = reached[:, j, i] = joined
+    # Each product doubles the length of the paths through joined pairs.
+    for _ in range(math.ceil(math.log2(count))):
+        reached = np.minimum(reached @ reached, 1.0)
+    same = reached > 0.0
+    first = same[:, 0]
+    others = np.where(
+        first[:, :, np.newaxis], first[:, np.newaxis], ~first[:, np.newaxis]
+    )
+    return first, np.all(same == others, axis=(1, 2)) & ~first.all(axis=1)
+
+
+def _jump_between(
+    before: NDArray[np.float64],
+    after: NDArray[np.float64],
+    std: NDArray[np.float64],
+    error: NDArray[np.float64],
+    first: NDArray[np.bool_],
+    search: LagSearch,
+) -> _Jump | None:
+    """Returns the jump between (p,) delays before and after it, if it is a fault.
+
+    The (n,) channels ``first`` keep their delays among themselves, and so do the
+    others.
+    """
+    rate, pairs, count = search.sample_rate_hz, search.pairs, search.shape.count
+    change = after - before
+    known = np.isfinite(change)
+    stays = known & (np.abs(change) <= error)
     i, j = pairs.T
     # Changes of the second group against the first one.
     across = known & (first[i] != first[j])
@@ -263,20 +302,28 @@ def _jump_at(split: int, delays: ChannelDelays, search: LagSearch) -> _Jump | No
     return _Jump(channels, step, significance, before, after, across)
 
 
-def _middles(
+def _next_medians(
     lags: NDArray[np.float64], rate: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns the medians of the first delays of each pair, and their errors, s."""
-    middles, errors = np.full((2, lags.shape[1]), np.nan)
-    for p, column in enumerate(lags.T):
-        few = column[np.isfinite(column)][:_MANY]
-        if len(few) < _LEAST:
-            continue
-        middles[p] = np.median(few)
-        scatter = 1.4826 * float(np.median(np.abs(few - middles[p])))
-        # The error of a median of n values is 1.25 times that of their mean.
-        errors[p] = 1.25 * max(scatter, _FLOOR_SAMPLES / rate) / math.sqrt(len(few))
-    return middles, errors
+    """Returns (s + 1, p) medians of the next delays of each pair, and their errors, s.
+
+    Row k contains those of the first delays from stretch k on.
+    """
+    heard: NDArray[np.bool_] = np.isfinite(lags)
+    # The delays of each pair, without gaps, and then NaN.
+    packed = np.take_along_axis(lags, np.argsort(~heard, axis=0, kind="stable"), axis=0)
+    packed = np.pad(packed, ((0, _MANY), (0, 0)), constant_values=np.nan)
+    skipped = np.pad(np.cumsum(heard, axis=0), ((1, 0), (0, 0)))
+    number = np.minimum(heard.sum(axis=0) - skipped, _MANY)
+    following = sliding_window_view(packed, _MANY, axis=0)
+    following = following[skipped, np.arange(lags.shape[1])]
+    middles = known_medians(following)
+    scatter = known_medians(np.abs(following - middles[:, :, np.newaxis]))
+    # The error of a median of n values is 1.25 times that of their mean.
+    errors = 1.25 * np.maximum(1.4826 * scatter, _FLOOR_SAMPLES / rate)
+    errors /= np.sqrt(np.maximum(number, 1))
+    enough = number >= _LEAST
+    return np.where(enough, middles, np.nan), np.where(enough, errors, np.nan)
 
 
 def _wave_explains(

@@ -23,6 +23,7 @@ from scipy import fft
 from scipy.stats import theilslopes
 
 from analysis.arrays.channel_fault import ChannelFault
+from analysis.arrays.known_medians import known_medians
 from analysis.arrays.wave_fronts import wave_front_misfits
 from systems.delays.correlations import correlations_at_lags
 
@@ -109,6 +110,7 @@ def clock_drift(
     p_AM: NDArray[np.float64],
     c: float,
     channels: Sequence[int] | None = None,
+    memory: MisfitMemory | None = None,
 ) -> ChannelFault | None:
     """Finds channels whose delays leave those of any source further and further.
 
@@ -119,6 +121,7 @@ def clock_drift(
     shape (k, n - 1), and ``t_s`` are the middles of the stretches. ``p_AM`` contains
     the positions of all microphones, m. If the n channels are not all channels,
     ``channels`` lists their numbers from 0.
+    Calls with the same microphones and mostly the same delays may share a ``memory``.
     """
     numbers = list(range(len(p_AM)) if channels is None else channels)
     places = p_AM[numbers]
@@ -127,7 +130,7 @@ def clock_drift(
     t_s, lags = t_s[heard], lags[heard]
     if len(t_s) < _LEAST or t_s[-1] - t_s[0] < _LEAST_S:
         return None
-    misfits = wave_front_misfits(lags, places, c)
+    misfits = (memory or MisfitMemory()).misfits(lags, places, c)
     # The delays may leave those of a source only in the second half of the time.
     parts = (misfits, misfits[-max(_LEAST, len(t_s) // 2) :])
     leaves = any(_leaves(part, places, c) for part in parts)
@@ -161,6 +164,24 @@ def clock_drift(
             "clock to be sure",
         )
     return None
+
+
+class MisfitMemory:
+    """Remembers the misfits of the last delays, because they take long to compute."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, NDArray[np.float64]] = {}
+
+    def misfits(
+        self, lags: NDArray[np.float64], places: NDArray[np.float64], c: float
+    ) -> NDArray[np.float64]:
+        """Computes ``wave_front_misfits`` for rows of delays that are not known yet."""
+        keys = [row.tobytes() for row in lags]
+        new = [k for k, key in enumerate(keys) if key not in self._known]
+        found = wave_front_misfits(lags[new], places, c)
+        known = self._known | dict(zip([keys[k] for k in new], found, strict=True))
+        self._known = {key: known[key] for key in keys}
+        return np.array([known[key] for key in keys])
 
 
 @dataclass(frozen=True)
@@ -226,9 +247,7 @@ def _without_echoes(
     """
     padded = np.pad(lags, ((_BESIDE, _BESIDE), (0, 0)), constant_values=np.nan)
     windows = sliding_window_view(padded, 2 * _BESIDE + 1, axis=0)
-    known = np.asarray(np.isfinite(windows).any(axis=2, keepdims=True))
-    usual = np.nanmedian(np.where(known, windows, 0.0), axis=2)
-    off = np.abs(lags - usual)
+    off = np.abs(lags - known_medians(windows))
     return np.where(off < 2.0 * allowed_s + _GROWTH_S, lags, np.nan)
 
 
@@ -252,7 +271,7 @@ def _leaves(
     along = growth[known] / size
     halfway = float((thirds[1] - thirds[0])[known] @ along) / size
     scatter = max(
-        float(np.nanmedian(np.abs((part - middle)[:, known] @ along)))
+        float(known_medians(np.abs((part - middle)[:, known] @ along)))
         for part, middle in zip(np.array_split(misfits, 3), thirds, strict=True)
     )
     return _HALFWAY < halfway < 1.0 - _HALFWAY and scatter < _SCATTER * size
@@ -261,8 +280,7 @@ def _leaves(
 def _median(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the medians of columns; NaN for a column with fewer than 3 numbers."""
     known = np.isfinite(values).sum(axis=0) >= 3
-    filled = np.where(known, values, 0.0)
-    return np.where(known, np.nanmedian(filled, axis=0), np.nan)
+    return np.where(known, known_medians(values, axis=0), np.nan)
 
 
 def _names(channels: Sequence[int]) -> str:

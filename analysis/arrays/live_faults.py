@@ -20,7 +20,12 @@ from analysis.arrays.channel_changes import (
 from analysis.arrays.channel_fault import ChannelFault
 from analysis.arrays.channel_faults import find_channel_faults
 from analysis.arrays.channel_timing import LagSearch
-from analysis.arrays.clock_drift import STRETCH_S, clock_drift, common_lags
+from analysis.arrays.clock_drift import (
+    STRETCH_S,
+    MisfitMemory,
+    clock_drift,
+    common_lags,
+)
 
 # _CLIPPED: magnitude that counts as full scale.
 # _CLIPPED_SHARE: a channel is clipped if at least this share of its samples is at full
@@ -78,6 +83,7 @@ class LiveFaults:
         if alive is not None:
             self._alive = list(alive)
         self._held: list[NDArray[np.float32]] = []
+        self._fresh: list[tuple[int, NDArray[np.float32]]] = []
         self._stretches: list[NDArray[np.float32]] = []
         self._lags: list[tuple[float, NDArray[np.float64]]] = []
         self._delays: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
@@ -91,6 +97,7 @@ class LiveFaults:
             if len(self._alive) > 2
             else None
         )
+        self._misfits = MisfitMemory()
         self._pending: Future[list[ChannelFault]] | None = None
         self._next, self._due = self._count + _TOGETHER, 0
 
@@ -99,7 +106,7 @@ class LiveFaults:
         self._worker.shutdown(cancel_futures=True)
 
     def look(self, channels: NDArray[np.float32]) -> Iterator[ChannelFault]:
-        """Examines the next (n, k) samples of the array's channels.
+        """Examines the levels of the next (n, k) samples of the array's channels.
 
         Channel numbers of faults begin with 0. A lasting fault is reported repeatedly.
         """
@@ -107,7 +114,19 @@ class LiveFaults:
         while sum(part.shape[1] for part in self._held) >= self._size:
             joined = np.concatenate(self._held, axis=1)
             self._held = [joined[:, self._size :]]
-            yield from self._of_stretch(joined[:, : self._size])
+            stretch = joined[:, : self._size]
+            self._count += 1
+            self._fresh.append((self._count, stretch))
+            yield from _clipped(stretch)
+            yield from _dead(stretch)
+
+    def compare(self) -> Iterator[ChannelFault]:
+        """Compares the channels of the stretches that ``look`` has completed.
+
+        This takes longer than ``look``. A lasting fault is reported repeatedly.
+        """
+        while self._fresh:
+            yield from self._compare(*self._fresh.pop(0))
 
     def finish(self) -> Iterator[ChannelFault]:
         """Reports the remaining faults at the end of the stream."""
@@ -116,24 +135,24 @@ class LiveFaults:
         if self._pending is not None:
             yield from self._pending.result()
 
-    def _of_stretch(self, stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
-        self._count += 1
+    def _compare(
+        self, number: int, stretch: NDArray[np.float32]
+    ) -> Iterator[ChannelFault]:
+        t_s = (number - 0.5) * STRETCH_S
         self._stretches = [*self._stretches, stretch][-_TOGETHER:]
-        yield from _clipped(stretch)
-        yield from _dead(stretch)
-        yield from self._change(stretch)
-        yield from self._drift(stretch)
+        yield from self._change(t_s, stretch)
+        yield from self._drift(t_s, stretch, judged=number % 4 == 0)
         if self._pending is not None:
-            if self._count < self._due or not self._is_done(self._pending):
+            if number < self._due or not self._is_done(self._pending):
                 return
             pending, self._pending = self._pending, None
             yield from pending.result()
-        if self._count < self._next or len(self._stretches) < _TOGETHER:
+        if number < self._next or len(self._stretches) < _TOGETHER:
             return
         if not self._hears():
             return
-        self._next = self._count + (_NEXT if self._looks < _FIRST_LOOKS else _LATER)
-        self._due = self._count + _TOLD
+        self._next = number + (_NEXT if self._looks < _FIRST_LOOKS else _LATER)
+        self._due = number + _TOLD
         self._pending = self._begin_look()
 
     def _hears(self) -> bool:
@@ -160,11 +179,12 @@ class LiveFaults:
         spare = self._begun + _TOLD * STRETCH_S - time.monotonic()
         return bool(wait([pending], max(0.0, spare)).done)
 
-    def _change(self, stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
+    def _change(
+        self, t_s: float, stretch: NDArray[np.float32]
+    ) -> Iterator[ChannelFault]:
         """Finds channels that lose samples, or the sound that the others have."""
         if self._search is None:
             return
-        t_s = (self._count - 0.5) * STRETCH_S
         found = stretch_delays(stretch[self._alive], self._search)
         self._delays = [*self._delays, (t_s, *found)][-_CHANGES:]
         t, lags, levels = (np.array(part) for part in zip(*self._delays, strict=True))
@@ -174,20 +194,23 @@ class LiveFaults:
         if fault is not None:
             yield fault
 
-    def _drift(self, stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
-        t_s = (self._count - 0.5) * STRETCH_S
+    def _drift(
+        self, t_s: float, stretch: NDArray[np.float32], *, judged: bool
+    ) -> Iterator[ChannelFault]:
         lags = common_lags(stretch[self._alive], self.sample_rate_hz)
         self._lags.append((t_s, lags))
         if len(self._lags) >= 2 * _MOST_LAGS:
             self._lags = self._lags[::2]
         # On a body, the delays of a source that moves fit no wave front in free air.
-        if self._count % 4 or self._known.shape.body is not None:
+        if not judged or self._known.shape.body is not None:
             return
         chosen = self._lags[:: -(-len(self._lags) // _MOST_LAGS)]
         times = np.array([t for t, _ in chosen])
         lags = np.array([lag for _, lag in chosen])
         places = self._known.shape.p_AM
-        fault = clock_drift(times, lags, places, self._known.c, self._alive)
+        fault = clock_drift(
+            times, lags, places, self._known.c, self._alive, self._misfits
+        )
         if fault is not None:
             yield fault
 

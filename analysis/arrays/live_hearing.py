@@ -154,6 +154,9 @@ class LiveHearing:
                     told = replace(step, unfit=doubted)
                     yield HeardStep(told, 10.0 * math.log10(power))
                     powers.clear()
+                # Lines do not wait for the comparison of the channels.
+                for fault in looks.compare():
+                    self._mend(fault, looks)
             for fault in looks.finish():
                 self._mend(fault, looks)
         finally:

@@ -7,6 +7,7 @@ they are the same for a recording and for a stream.
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,10 +40,13 @@ _LEAST_POWER = 1e-30
 
 def levels_db(powers: NDArray[np.float32]) -> NDArray[np.float64]:
     """Returns (g, 24) levels of single bins in dB, with equal numbers per octave."""
-    last = powers.shape[1] - 1
-    kept = np.rint(np.geomspace(1.0, last + 1.0, _LEVELS)).astype(int) - 1
-    chosen = powers[:, kept].astype(np.float64)
+    chosen = powers[:, _kept_bins(powers.shape[1])].astype(np.float64)
     return np.asarray(10.0 * np.log10(np.maximum(chosen, _LEAST_POWER)))
+
+
+@cache
+def _kept_bins(count: int) -> NDArray[np.int64]:
+    return np.rint(np.geomspace(1.0, count, _LEVELS)).astype(int) - 1
 
 
 def no_levels() -> NDArray[np.float32]:
@@ -50,9 +54,10 @@ def no_levels() -> NDArray[np.float32]:
     return np.empty(0, np.float32)
 
 
-def a_weight(bins: slice, per_hz: float) -> NDArray[np.float32]:
-    """Returns the A-weighting of power (IEC 61672-1) at the bins, at 1 kHz about 1."""
-    f = np.arange(bins.start, bins.stop) / per_hz
+@cache
+def a_weight(start: int, stop: int, per_hz: float) -> NDArray[np.float32]:
+    """Returns the A-weighting of power (IEC 61672-1) at bins, at 1 kHz about 1."""
+    f = np.arange(start, stop) / per_hz
     weight = 12194.0**2 * f**4 / ((f**2 + 20.6**2) * (f**2 + 12194.0**2))
     weight /= np.sqrt((f**2 + 107.7**2) * (f**2 + 737.9**2))
     return np.asarray((1.259 * weight) ** 2, dtype=np.float32)

@@ -192,7 +192,9 @@ def cast_votes(
     hop_s = plan.hop / plan.sample_rate_hz
     rises, steady_db = standing_out(powers, memory.steady_db, hop_s)
     used = plan.bins if bins.shape[1] else plan.steered.bins
-    heard = powers * a_weight(used, len(plan.window) / plan.sample_rate_hz)
+    heard = powers * a_weight(
+        used.start, used.stop, len(plan.window) / plan.sample_rate_hz
+    )
     cast = [
         _steered_votes(
             plan,

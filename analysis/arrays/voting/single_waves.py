@@ -13,6 +13,7 @@ relative to that of sound, so the slowness of a sound wave has the length 1.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -189,8 +190,6 @@ class PhasePlane:
         """
         slowness = np.empty((len(phase), self.guesses.shape[1]))
         clear = np.empty(len(phase), dtype=bool)
-        apart = np.linalg.norm(self.guesses[:, np.newaxis] - self.guesses, axis=2)
-        apart = apart > _APART
         paths = self.paths @ self.guesses.T
         for wave_number in np.unique(number):
             mine = np.flatnonzero(number == wave_number)
@@ -198,10 +197,16 @@ class PhasePlane:
             cosine = (np.exp(1j * phase[mine]) @ waves).real / len(paths)
             best = cosine.argmax(axis=1)
             highest = cosine[np.arange(len(mine)), best]
-            others = np.where(apart[best], cosine, -1.0).max(axis=1)
+            others = np.where(self._apart[best], cosine, -1.0).max(axis=1)
             slowness[mine] = self.guesses[best]
             clear[mine] = others < highest - _ALMOST
         return slowness, clear
+
+    @cached_property
+    def _apart(self) -> NDArray[np.bool_]:
+        """(g, g) whether two guesses are clearly different."""
+        off = self.guesses[:, np.newaxis] - self.guesses
+        return np.asarray(np.linalg.norm(off, axis=2) > _APART)
 
     def _directions(
         self, slowness: NDArray[np.float64]

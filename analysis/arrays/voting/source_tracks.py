@@ -31,11 +31,11 @@ from analysis.arrays.voting.track_state import (
     apart_rad,
     born,
     heard,
+    innovation,
     missed,
     predicted,
     scatter,
 )
-from analysis.arrays.voting.vote_bearings import wrapped
 from analysis.arrays.voting.vote_peaks import VotedSource
 
 # Largest angle between a detection and its track, rad.
@@ -44,6 +44,15 @@ _FARTHEST = math.radians(45.0)
 # A reported track ends if the mean share of its detections falls below this part of
 # ``TrackParameters.least_share``. Most such tracks are reflections.
 _KEPT = 0.8
+
+# Two tracks share a detection only if its distance from the nearer one is at least this
+# part of the distance between them. Otherwise it is a detection of that track.
+_BETWEEN = 0.25
+
+# While another source sounds, a new track must be so many times as old before it is
+# reported. Two sources that sound together also cause votes between them, but these
+# rarely last.
+_BESIDE = 2.0
 
 
 @dataclass(frozen=True)
@@ -99,8 +108,10 @@ def step_tracks(
         if track.identity and t_s - track.t_heard <= parameters.remembered_s
     ]
     identity, kept = memory.next_identity, [*alive, *new]
+    others = any(track.identity and track.sounding > 0.5 for track in alive)
+    least_s = parameters.begins_after_s * (_BESIDE if others else 1.0)
     for track in alive + new:
-        if track.identity or not _is_told(track, t_s, parameters):
+        if track.identity or not _is_told(track, t_s, least_s, parameters):
             continue
         kept.remove(track)
         old = _returned(track, [t for t in kept if t.identity] + ended, parameters)
@@ -138,8 +149,8 @@ def _assigned(
     cost = np.empty((len(tracks), len(detections)))
     for i, track in enumerate(tracks):
         for k, d in enumerate(detections):
-            variance = float(track.covariance[0, 0]) + scatter(track, d, p)
-            off = wrapped(d.bearing - track.bearing)
+            off, variance = innovation(track, d)
+            variance += scatter(track, d, p)
             # Reported tracks have priority, so that a new track does not take their
             # detections.
             late = 0.0 if track.identity else 4.0
@@ -172,14 +183,17 @@ def _hidden(
                 continue
             apart = apart_rad(track, other)
             off = apart_rad(detections[k], track)
-            if apart < resolution and off < resolution:
+            between = apart_rad(detections[k], other) > _BETWEEN * apart
+            if apart < resolution and off < resolution and between:
                 hidden[i] = j
                 break
     return hidden
 
 
-def _is_told(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
-    old = t_s - track.t_born >= p.begins_after_s - 1e-9
+def _is_told(
+    track: SourceTrack, t_s: float, least_s: float, p: TrackParameters
+) -> bool:
+    old = track.t_heard == t_s and t_s - track.t_born >= least_s - 1e-9
     loud = track.share >= p.least_share
     return old and loud and track.hits >= p.least_hits and track.confidence > 0.9
 

@@ -60,7 +60,8 @@ class TrackParameters(Parameters):
     resolution_deg: float = Field(default=20.0, gt=0.0, le=90.0)
     """Angle below which two sources may give only one detection, deg."""
     begins_after_s: Positive = 0.25
-    """Least age of a track that is reported, s."""
+    """Least age of a track that is reported, s. While another source sounds, the least
+    age is twice as long."""
     least_share: Fraction = 0.25
     """Least share of the heard sound for the first detection of a track. The mean share
     of its detections must also be at least this value when the track is reported, and
@@ -175,11 +176,23 @@ def scatter(track: SourceTrack, detection: VotedSource, p: TrackParameters) -> f
     return detection.own_variance + p.smear_s**2 * rate_squared
 
 
+def innovation(track: SourceTrack, detection: VotedSource) -> tuple[float, float]:
+    """Returns how far a detection is from its prediction, rad, and its variance, rad^2.
+
+    The variance is that of the prediction, at the time of the detection.
+    """
+    H = np.array([1.0, detection.later_s])
+    off = wrapped(detection.bearing - track.bearing - detection.later_s * track.rate)
+    return off, float(H @ track.covariance @ H)
+
+
 def heard(
     track: SourceTrack, detection: VotedSource, t_s: float, p: TrackParameters
 ) -> SourceTrack:
     """Returns a track after a step with a detection of it."""
+    # The louder other sources are, the more they shift a detection.
     of_detection = scatter(track, detection, p)
+    of_detection *= max(1.0, track.share / max(detection.share, 0.01)) ** 2
     C, rate = track.covariance, track.rate
     if detection.rate:
         # The rate of a source that turns fast is measured as well.
@@ -188,13 +201,14 @@ def heard(
         track = replace(track, bearing=track.bearing + float(turned[0]))
         rate += float(turned[1])
         C = C - np.outer(share, C[1])
-    off = wrapped(detection.bearing - track.bearing)
-    if off**2 > GATE**2 * (float(C[0, 0]) + of_detection):
+    H = np.array([1.0, detection.later_s])
+    off, variance = innovation(replace(track, rate=rate, covariance=C), detection)
+    if off**2 > GATE**2 * (variance + of_detection):
         of_detection += BIAS_STD**2
-    variance = float(C[0, 0]) + of_detection
-    gain = C[:, 0] / variance
+    variance += of_detection
+    gain = C @ H / variance
     # Joseph's form of the covariance update keeps the covariance symmetric.
-    A = np.eye(2) - np.outer(gain, [1.0, 0.0])
+    A = np.eye(2) - np.outer(gain, H)
     height = math.exp(-0.5 * off**2 / variance) / math.sqrt(2.0 * math.pi * variance)
     density = p.false_detections / (2.0 * math.pi)
     ratio = 1.0 - p.detection_probability
@@ -231,11 +245,13 @@ def missed(track: SourceTrack, p: TrackParameters) -> SourceTrack:
 def born(detection: VotedSource, t_s: float) -> SourceTrack:
     """Returns a new track from its first detection."""
     rate_std = _TURN_STD if detection.rate else _RATE_STD
+    later = np.array([-detection.later_s, 1.0])
     return SourceTrack(
         identity=0,
         bearing=wrapped(detection.bearing),
         rate=detection.rate,
-        covariance=np.diag([detection.own_variance, rate_std**2]),
+        covariance=np.diag([detection.own_variance, 0.0])
+        + rate_std**2 * np.outer(later, later),
         elevation=detection.elevation,
         sounding=_BORN,
         silent=0.0,

@@ -97,6 +97,9 @@ class VotedSource(NamedTuple):
     has at least three times the required number of votes."""
     rate: float = 0.0
     """Rate of the bearing, rad/s. It is 0 unless the source turns fast."""
+    later_s: float = 0.0
+    """Time of the bearing after the middle of the span of time, s. The loudest sound of
+    the span determines the bearing."""
     common_std: float = 0.0
     """Part of ``bearing_std`` from reflections that move all votes alike, rad. It is
     about the same in consecutive spans of time."""
@@ -152,7 +155,7 @@ def gather_sources(
 def gather_turning(
     votes: DirectionVotes, t_s: float, *, least_votes: float
 ) -> list[VotedSource]:
-    """Finds the sources in a short span of time with the middle t_s, at this middle.
+    """Finds the sources in a short span of time with the middle t_s.
 
     While a source turns fast, its votes spread over many directions, and only parts of
     them form peaks. If the votes agree far better when they are turned back by a common
@@ -170,10 +173,11 @@ def gather_turning(
     best = int(np.argmax(heights))
     rate = float(_RATES[best])
     if heights[best] < _TURNS * heights[_RATES.size // 2]:
-        rate = 0.0
+        found = gather_sources(votes, least_votes=least_votes)
+        return [source._replace(later_s=source.later_s - t_s) for source in found]
     turned = votes._replace(azimuth=wrapped(votes.azimuth - rate * (votes.t_s - t_s)))
     found = gather_sources(turned, least_votes=least_votes)
-    return [source._replace(rate=rate) for source in found]
+    return [source._replace(rate=rate, later_s=0.0) for source in found]
 
 
 def _weighed(votes: DirectionVotes) -> DirectionVotes:
@@ -205,6 +209,7 @@ def _steep_source(
         rises=float(votes.rises[chosen].mean()),
         votes=count,
         confidence=math.sqrt(min(1.0, 2.0 * share)) * sure,
+        later_s=_mean_time(votes, chosen),
     )
 
 
@@ -288,9 +293,14 @@ def _source(
         rises=float(votes.rises[mine].mean()),
         votes=count,
         confidence=0.0,
+        later_s=_mean_time(votes, mine),
         common_std=found.common_std,
         steered_share=None if steered is None else _near_share(steered, bearing),
     )
+
+
+def _mean_time(votes: DirectionVotes, chosen: NDArray[np.bool_]) -> float:
+    return float(np.average(votes.t_s[chosen], weights=votes.weight[chosen]))
 
 
 def _near_share(votes: DirectionVotes, bearing: float) -> float:

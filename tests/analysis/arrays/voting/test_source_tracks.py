@@ -14,7 +14,7 @@ from analysis.arrays.voting.vote_peaks import VotedSource
 STD = math.radians(2.0)
 
 
-def detected(bearing, share=1.0):
+def detected(bearing, share=1.0, later_s=0.0):
     return VotedSource(
         bearing=bearing,
         bearing_std=STD,
@@ -25,7 +25,18 @@ def detected(bearing, share=1.0):
         rises=1.0,
         votes=10,
         confidence=1.0,
+        later_s=later_s,
     )
+
+
+def follow_detections(steps, step_s=0.1):
+    """Tracks after each step of detections (bearing in deg, share, later_s)."""
+    memory, told = TrackMemory(), []
+    for k, step in enumerate(steps):
+        found = [detected(math.radians(deg), *rest) for deg, *rest in step]
+        tracks, memory = step_tracks(found, k * step_s, memory, TrackParameters())
+        told.append(tracks)
+    return told
 
 
 def follow(ways, steps, step_s=0.1, seed=0):
@@ -117,3 +128,58 @@ def test_errors_that_change_slowly_are_in_the_stated_error(wander_deg, largest_s
     std = np.degrees([track.bearing_std for track in tracks])
     assert np.mean(np.abs(off) < 2.0 * std) > 0.9
     assert np.median(std) < largest_std_deg
+
+
+def test_syllables_of_a_source_that_turns_are_detections_at_their_own_times():
+    """A source turns at 45 deg/s. Its syllables sound every 0.5 s.
+
+    A window of 0.5 s hears only the last one. Its detections stay at its bearing.
+    """
+    steps = []
+    for k in range(50):
+        middle = 0.1 * k - 0.25
+        syllable = 0.5 * math.floor(0.1 * k / 0.5 + 1e-9)
+        steps.append([(45.0 * syllable, 1.0, syllable - middle)])
+    told = follow_detections(steps)
+    assert {t.identity for tracks in told for t in tracks} == {1}
+    track = told[-1][0]
+    assert math.degrees(track.rate) == pytest.approx(45.0, rel=0.1)
+    true = math.radians(45.0 * (4.9 - 0.25))
+    off = math.degrees(math.remainder(track.bearing - true, 2.0 * math.pi))
+    assert abs(off) < 3.0
+
+
+def test_votes_between_two_sources_that_last_half_a_window_are_no_source():
+    two = [(-20.0, 0.4), (20.0, 0.4)]
+    told = follow_detections(
+        [[*two, (0.0, 0.3)] if 10 <= k < 15 else two for k in range(40)]
+    )
+    assert {t.identity for tracks in told for t in tracks} == {1, 2}
+
+
+def test_a_source_that_begins_beside_another_is_told_within_one_second():
+    told = follow_detections(
+        [[(-20.0, 0.5), (40.0, 0.5)][: 1 + (k >= 20)] for k in range(40)]
+    )
+    first = min(k for k, tracks in enumerate(told) if len(tracks) == 2)
+    assert 0.5 <= 0.1 * (first - 20) <= 1.0
+
+
+def test_a_faint_detection_moves_a_track_less():
+    """The share of a detection is its weight as a standard deviation."""
+
+    def bearing(share):
+        told = follow_detections([[(0.0, 1.0)]] * 20 + [[(6.0, share)]])
+        return math.degrees(told[-1][0].bearing)
+
+    assert 0.0 < bearing(0.2) < 0.5 * bearing(1.0)
+
+
+def test_two_tracks_do_not_keep_a_detection_of_one_of_them_from_it():
+    """The second track passes the source at 12 deg/s, and is not heard again."""
+    steps = [[(30.0 - 1.2 * k, 0.5), (0.0, 0.5)] for k in range(14)]
+    steps += [[(0.0, 0.5)]] * 20
+    for tracks in follow_detections(steps)[14:]:
+        nearest = min(tracks, key=lambda track: abs(track.bearing))
+        assert abs(math.degrees(nearest.bearing)) < 2.0
+        assert math.degrees(nearest.bearing_std) < 4.0
