@@ -10,7 +10,12 @@ from numba.extending import register_jitable
 
 from systems.framework.compiling import njit
 from systems.safety.free_space import FreeSpace, cells_within
-from systems.safety.group_view import group_view, look_along_row, seen_in_sectors
+from systems.safety.group_view import (
+    RowView,
+    group_view,
+    look_along_row,
+    seen_in_sectors,
+)
 from systems.safety.views import Sectors, lasting
 
 register_jitable(lasting)
@@ -69,7 +74,8 @@ def see(
     # Radius of the circle around a cell.
     half = cell * math.sqrt(0.5)
     seen = seen_in_sectors(sectors, readings)
-    row, distances = np.empty((cells, 4)), np.empty(cells)
+    way, reading, echo = np.empty(cells), np.empty(cells), np.empty(cells)
+    distances, begins = np.empty(cells), np.zeros(cells + 1, np.int64)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
@@ -97,14 +103,20 @@ def see(
                 dy = (first + k + 0.5) * cell - sy
                 distances[k] = math.sqrt(dx * dx + dy * dy)
             begin_y = (first + 0.5) * cell - sy
-            look_along_row(dx, begin_y, cell, view, row[:count])
+            row = RowView(way[:count], reading[:count], echo[:count], begins)
+            look_along_row(dx, begin_y, cell, view, row)
             # The map stores the row in two pieces, because its indices wrap around.
             at = first % cells
             piece, turned = min(count, cells - at), i % cells
-            of_row = row[:piece], distances[:piece]
+            of_row = way[:piece], reading[:piece], echo[:piece], distances[:piece]
             _enter_row(space, turned, at, of_row, sigma, from_axle, error)
             if piece < count:
-                of_row = row[piece:count], distances[piece:count]
+                of_row = (
+                    way[piece:count],
+                    reading[piece:count],
+                    echo[piece:count],
+                    distances[piece:count],
+                )
                 _enter_row(space, turned, 0, of_row, sigma, from_axle, error)
 
 
@@ -126,8 +138,8 @@ def _enter_row(
     """
     # Radius of the circle around a cell.
     half = space.cell_m * math.sqrt(0.5)
-    (row, distances), rolled_m = of_row, space.rolled_m[0]
-    count = len(row)
+    (way, readings, echo, distances), rolled_m = of_row, space.rolled_m[0]
+    count = len(way)
     free_until = space.free_until[i, first : first + count]
     hits = space.hits[i, first : first + count]
     evidence = space.evidence[i, first : first + count]
@@ -137,7 +149,7 @@ def _enter_row(
         if distance < 2.0 * half:
             continue
         far = distance + half
-        free, reading = row[k, 0] >= far, row[k, 1]
+        free, reading = way[k] >= far, readings[k]
         # A reading that is too short leaves cells without evidence as they are.
         if free or reading > far or (evidence[k] > 0.0 and reading > -np.inf):
             until = rolled_m + lasting(distance + from_axle, error)
@@ -151,7 +163,7 @@ def _enter_row(
             if free:
                 free_until[k] = max(free_until[k], until)
                 hits[k], evidence[k] = 0.0, 0.0
-        if not free and abs(distance - row[k, 2]) <= half:
+        if not free and abs(distance - echo[k]) <= half:
             hits[k] += min(1.0, _FULL_HIT_M / distance)
 
 
