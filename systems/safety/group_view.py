@@ -40,8 +40,9 @@ def seen_in_sectors(
         seen[k, 0], seen[k, 1], seen[k, 3], seen[k, 4] = 0.0, np.inf, -np.inf, 1.0
     last = -1
     for n in range(len(sectors.pairs)):
-        k, sensor = sectors.pairs[n]
-        free, echo, reading, noise_m = readings[sensor]
+        k, sensor = sectors.pairs[n, 0], sectors.pairs[n, 1]
+        free, echo = readings[sensor, 0], readings[sensor, 1]
+        reading, noise_m = readings[sensor, 2], readings[sensor, 3]
         if k != last and noise_m > 0.0:
             seen[k, 3], seen[k, 4] = reading, noise_m
         seen[k, 0], seen[k, 1] = max(seen[k, 0], free), min(seen[k, 1], echo)
@@ -84,12 +85,16 @@ class GroupView(NamedTuple):
 class RowView(NamedTuple):
     """What a group of sensors has seen toward the cells of a row."""
 
+    distance: NDArray[np.float64]
+    """(m,) distance of the middle of the cell from the group, m."""
     way: NDArray[np.float64]
     """(m,) distance seen free, m."""
     reading: NDArray[np.float64]
     """(m,) reading less all errors but noise, m."""
     echo: NDArray[np.float64]
     """(m,) distance of the nearest echo, m."""
+    doubt: NDArray[np.float64]
+    """(m,) scratch."""
     begins: NDArray[np.int64]
     """(m + 1,) scratch memory for the sectors that begin at the cells. It is 0 between
     two calls of ``look_along_row``."""
@@ -122,10 +127,10 @@ def group_view(
             reading, echo = seen[k, 3], seen[k, 1]
         elif stop - start > math.tau - 1e-9:
             break  # the group sees all around
-        if count > 0:
-            last = views[count - 1]
-            if way == last[0] and reading == last[1] and echo == last[2]:
-                continue
+        n = max(count - 1, 0)
+        same = way == views[n, 0] and reading == views[n, 1] and echo == views[n, 2]
+        if count > 0 and same:
+            continue
         views[count, 0], views[count, 1], views[count, 2] = way, reading, echo
         cosines[count] = _not_zero(math.cos(heading + angle))
         sines[count] = _not_zero(math.sin(heading + angle))
@@ -136,21 +141,22 @@ def group_view(
         np.empty((2, 6, most)),
         np.empty((3, most)),
     )
-    sector = _sector_of_minus_y(cosines[:count], sines[:count])
-    view.seen[0, 0] = view.seen[1, 0] = views[sector]
+    sector = _sector_of_minus_y(cosines, sines, count)
+    for n in range(3):
+        view.seen[0, 0, n] = view.seen[1, 0, n] = views[sector, n]
     for n in range(1, count + 1):
         # Edge k is between the sectors k - 1 and k.
         k = (sector + n) % count
         if cosines[k] < 0.0:
             break
-        before = views[k - 1 if k > 0 else count - 1]
-        _add_edge(view, 0, (cosines[k], sines[k]), before, views[k], half)
+        before = k - 1 if k > 0 else count - 1
+        _add_edge(view, 0, cosines[k], sines[k], views, before, k, half)
     for n in range(count):
         k = (sector - n) % count
         if cosines[k] > 0.0:
             break
-        behind = views[k - 1 if k > 0 else count - 1]
-        _add_edge(view, 1, (cosines[k], sines[k]), views[k], behind, half)
+        behind = k - 1 if k > 0 else count - 1
+        _add_edge(view, 1, cosines[k], sines[k], views, k, behind, half)
     return view
 
 
@@ -160,13 +166,12 @@ def _not_zero(value: float) -> float:
 
 
 @register_jitable
-def _sector_of_minus_y(cosines: Any, sines: Any) -> int:
+def _sector_of_minus_y(cosines: Any, sines: Any, count: int) -> int:
     """Finds the sector that contains the direction of -y.
 
     From the right edge of this sector to the left, x becomes positive or the tangent of
     the direction decreases.
     """
-    count = len(cosines)
     for k in range(count):
         left = k + 1 if k + 1 < count else 0
         falls = sines[left] / cosines[left] <= sines[k] / cosines[k]
@@ -178,25 +183,33 @@ def _sector_of_minus_y(cosines: Any, sines: Any) -> int:
 
 @register_jitable
 def _add_edge(
-    view: GroupView, side: int, direction: Any, before: Any, behind: Any, half: float
+    view: GroupView,
+    side: int,
+    cosine: float,
+    sine: float,
+    views: Any,
+    before: int,
+    behind: int,
+    half: float,
 ) -> None:
     """Adds an edge to a side of a view, and the sector behind it.
 
-    ``direction`` has the cosine and the sine of the direction of the edge. ``before``
-    and ``behind`` are the distances in the sectors beside the edge, in the order of a
-    row.
+    ``before`` and ``behind`` are the indices of the sectors beside the edge, in the
+    order of a row.
     """
-    (cosine, sine), n, edges = direction, view.sizes[side], view.edges[side]
-    edges[0, n], edges[1, n], edges[2, n] = sine, sine / cosine, cosine / sine
-    edges[3, n] = half / abs(cosine)
-    edges[4, n], edges[5, n] = min(before[0], behind[0]), min(before[1], behind[1])
-    view.seen[side, n + 1] = behind
+    n, edges = view.sizes[side], view.edges
+    edges[side, 0, n], edges[side, 1, n] = sine, sine / cosine
+    edges[side, 2, n], edges[side, 3, n] = cosine / sine, half / abs(cosine)
+    for m in range(2):
+        edges[side, 4 + m, n] = min(views[before, m], views[behind, m])
+    for m in range(3):
+        view.seen[side, n + 1, m] = views[behind, m]
     view.sizes[side] = n + 1
 
 
 @njit(cache=True, error_model="numpy")
 def look_along_row(
-    dx: float, begin_y: float, cell: float, view: GroupView, row: RowView
+    dx: float, begin_y: float, cell: float, count: int, view: GroupView, row: RowView
 ) -> None:  # pragma: no cover  (compiled)
     """Computes how far a group of sensors has seen toward the cells of a row.
 
@@ -209,22 +222,23 @@ def look_along_row(
         dx: Position of the row relative to the group, m.
         begin_y: Position of the middle of the first cell relative to the group, m.
         cell: Side of a cell, m.
+        count: Number of cells.
         view: What the group has seen.
         row: Arrays that the function fills for each cell.
     """
-    half, count, cuts = cell * math.sqrt(0.5), len(row.way), view.cuts
+    half, edges, cuts = cell * math.sqrt(0.5), view.edges, view.cuts
     own = 0 if dx >= 0.0 else 1
     for side in (own, 1 - own):
         # A circle that contains a part of the y-axis can meet edges on both sides.
         if side != own and abs(dx) > half:
             break
-        edges, size = view.edges[side], view.sizes[side]
-        _cut_row(dx, begin_y, cell, float(count), size, edges, cuts)
+        size = view.sizes[side]
+        _cut_row(dx, begin_y, cell, float(count), side, size, edges, cuts)
         if side == own:
-            _fill_row(view.seen[side], cuts[0, :size], row)
+            _fill_row(view.seen, side, cuts, size, row, count)
         # The cells whose circles meet an edge.
         for k in range(size):
-            way, reading = edges[4, k], edges[5, k]
+            way, reading = edges[side, 4, k], edges[side, 5, k]
             for n in range(int(cuts[1, k]), int(cuts[2, k])):
                 row.way[n] = min(row.way[n], way)
                 row.reading[n] = min(row.reading[n], reading)
@@ -233,20 +247,21 @@ def look_along_row(
 
 
 @register_jitable
-def _fill_row(seen: Any, cuts: Any, row: RowView) -> None:
+def _fill_row(
+    seen: Any, side: int, cuts: Any, size: int, row: RowView, count: int
+) -> None:
     """Enters the sector that contains the middle of each cell.
 
-    ``seen`` has the sectors in the order of the row. ``cuts`` has the first cell behind
-    each edge. The loops have no branches, which the processor would have to predict.
+    The loops have no branches, which the processor would have to predict.
     """
-    for k in range(len(cuts)):
-        row.begins[int(cuts[k])] = k + 1
+    for k in range(size):
+        row.begins[int(cuts[0, k])] = k + 1
     sector = 0
-    for n in range(len(row.way)):
+    for n in range(count):
         sector, row.begins[n] = max(sector, row.begins[n]), 0
-        row.way[n], row.reading[n] = seen[sector, 0], seen[sector, 1]
-        row.echo[n] = seen[sector, 2]
-    row.begins[len(row.way)] = 0
+        row.way[n], row.reading[n] = seen[side, sector, 0], seen[side, sector, 1]
+        row.echo[n] = seen[side, sector, 2]
+    row.begins[count] = 0
 
 
 @njit(cache=True, error_model="numpy")
@@ -255,6 +270,7 @@ def _cut_row(
     begin_y: float,
     cell: float,
     count: float,
+    side: int,
     size: int,
     edges: Any,
     cuts: Any,
@@ -266,8 +282,8 @@ def _cut_row(
     has no branches, which the loops over cells would have to wait for.
     """
     for k in range(size):
-        middle, behind, wide = dx * edges[1, k], -dx * edges[2, k], edges[3, k]
-        low, high, ahead = middle - wide, middle + wide, edges[0, k] > 0.0
+        middle, behind, wide = dx * edges[side, 1, k], -dx * edges[side, 2, k], edges[side, 3, k]
+        low, high, ahead = middle - wide, middle + wide, edges[side, 0, k] > 0.0
         low = max(low, behind) if ahead else low
         high = high if ahead else min(high, behind)
         first = np.ceil((middle - begin_y) / cell)

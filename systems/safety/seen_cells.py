@@ -74,23 +74,29 @@ def see(
     # Radius of the circle around a cell.
     half = cell * math.sqrt(0.5)
     seen = seen_in_sectors(sectors, readings)
-    way, reading, echo = np.empty(cells), np.empty(cells), np.empty(cells)
-    distances, begins = np.empty(cells), np.zeros(cells + 1, np.int64)
+    row = RowView(
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.zeros(cells + 1, np.int64),
+    )
+    found = np.empty(cells, np.int64)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
-        ahead, aside = sectors.places[group]
+        ahead, aside = sectors.places[group, 0], sectors.places[group, 1]
         # Position of the group in the frame of the odometry.
         sx, sy = pose[0] + c * ahead - s * aside, pose[1] + s * ahead + c * aside
         right, left = sectors.right[begin, 0], sectors.left[end - 1, 0]
         from_axle = math.hypot(ahead, aside)
-        farthest = np.max(seen[begin:end, 2])
+        farthest, sigma = _greatest(seen, begin, end, 2), _greatest(seen, begin, end, 4)
         low_x, low_y, high_x, high_y = _sector_box(
             sx, sy, pose[2] + right, pose[2] + left, farthest + cell
         )
         low_i, low_j, high_i, high_j = cells_within(space, low_x, low_y, high_x, high_y)
         view = group_view(sectors, seen, begin, end, pose[2], half)
-        sigma = np.max(seen[begin:end, 4])
         for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
             dx = (i + 0.5) * cell - sx
             # The cells of the row that are not too far away.
@@ -101,69 +107,112 @@ def see(
                 continue
             for k in range(count):
                 dy = (first + k + 0.5) * cell - sy
-                distances[k] = math.sqrt(dx * dx + dy * dy)
-            begin_y = (first + 0.5) * cell - sy
-            row = RowView(way[:count], reading[:count], echo[:count], begins)
-            look_along_row(dx, begin_y, cell, view, row)
+                row.distance[k] = math.sqrt(dx * dx + dy * dy)
+            look_along_row(dx, (first + 0.5) * cell - sy, cell, count, view, row)
             # The map stores the row in two pieces, because its indices wrap around.
-            at = first % cells
-            piece, turned = min(count, cells - at), i % cells
-            of_row = way[:piece], reading[:piece], echo[:piece], distances[:piece]
-            _enter_row(space, turned, at, of_row, sigma, from_axle, error)
-            if piece < count:
-                of_row = (
-                    way[piece:count],
-                    reading[piece:count],
-                    echo[piece:count],
-                    distances[piece:count],
-                )
-                _enter_row(space, turned, 0, of_row, sigma, from_axle, error)
+            at, turned = first % cells, i % cells
+            piece = min(count, cells - at)
+            for begin, end, at in ((0, piece, at), (piece, count, 0)):
+                which = begin, end, turned, at
+                _enter_free(space, which, row, from_axle, error)
+                doubts = _find_doubts(space, which, row, found)
+                _enter_doubts(space, which, row, found[:doubts], sigma, from_axle, error)
+
+
+@register_jitable
+def _greatest(seen: Any, begin: int, end: int, column: int) -> float:
+    """Returns the largest number in some rows of a column."""
+    greatest = seen[begin, column]
+    for k in range(begin + 1, end):
+        greatest = max(greatest, seen[k, column])
+    return greatest
 
 
 @njit(cache=True, error_model="numpy")
-def _enter_row(
+def _enter_free(
+    space: FreeSpace, piece: Any, row: RowView, from_axle: float, error: Any
+) -> None:  # pragma: no cover  (compiled)
+    """Marks cells as free that a group of sensors has seen free in one look.
+
+    ``piece`` has the indices of the first cell in ``row``, of the cell after the last,
+    and of the row and of the first cell in the arrays of the map. The loop has no
+    branches, so that the processor computes several cells at once.
+    """
+    begin, end, i, at = piece
+    half, rolled_m = space.cell_m * math.sqrt(0.5), space.rolled_m[0]
+    free_until = space.free_until[i, at : at + end - begin]
+    ways, distances = row.way[begin:end], row.distance[begin:end]
+    for k in range(end - begin):
+        distance = distances[k]
+        free = (ways[k] >= distance + half) & (distance >= 2.0 * half)
+        until = max(free_until[k], rolled_m + lasting(distance + from_axle, error))
+        free_until[k] = until if free else free_until[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _find_doubts(
+    space: FreeSpace, piece: Any, row: RowView, found: Any
+) -> int:  # pragma: no cover  (compiled)
+    """Lists the cells of which hits or evidence may change.
+
+    Returns their number. ``found`` gets their indices in the piece; see
+    ``_enter_free``.
+    """
+    begin, end, i, at = piece
+    half, count = space.cell_m * math.sqrt(0.5), end - begin
+    hits, evidence = space.hits[i, at : at + count], space.evidence[i, at : at + count]
+    ways, distances = row.way[begin:end], row.distance[begin:end]
+    readings, echoes, doubts = row.reading[begin:end], row.echo[begin:end], row.doubt
+    for k in range(count):
+        distance = distances[k]
+        far = distance + half
+        echoes_here = abs(distance - echoes[k]) <= half
+        doubt = (hits[k] > 0.0) & (ways[k] >= far)
+        doubt |= (echoes_here | (readings[k] > far)) & (ways[k] < far)
+        doubt |= evidence[k] > 0.0
+        doubts[k] = 1.0 if doubt & (distance >= 2.0 * half) else 0.0
+    number = 0
+    for k in range(count):
+        found[number] = k
+        number += int(doubts[k])
+    return number
+
+
+@njit(cache=True, error_model="numpy")
+def _enter_doubts(
     space: FreeSpace,
-    i: int,
-    first: int,
-    of_row: Any,
+    piece: Any,
+    row: RowView,
+    doubts: Any,
     sigma: float,
     from_axle: float,
     error: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Changes the cells of a row of the map; see ``see``.
-
-    ``i`` is the row of the arrays, and ``first`` the first cell in it. ``of_row`` has
-    what the group has seen toward each cell (see ``look_along_row``), and the
-    distances of the middles of the cells from the group, m.
-    """
-    # Radius of the circle around a cell.
-    half = space.cell_m * math.sqrt(0.5)
-    (way, readings, echo, distances), rolled_m = of_row, space.rolled_m[0]
-    count = len(way)
-    free_until = space.free_until[i, first : first + count]
-    hits = space.hits[i, first : first + count]
-    evidence = space.evidence[i, first : first + count]
-    evident_until = space.evident_until[i, first : first + count]
-    for k in range(count):
-        distance = distances[k]
-        if distance < 2.0 * half:
-            continue
+    """Changes hits and evidence of the cells in ``doubts``; see ``see``."""
+    begin, end, i, at = piece
+    half, rolled_m = space.cell_m * math.sqrt(0.5), space.rolled_m[0]
+    free_until = space.free_until[i, at : at + end - begin]
+    hits = space.hits[i, at : at + end - begin]
+    evidence = space.evidence[i, at : at + end - begin]
+    evident_until = space.evident_until[i, at : at + end - begin]
+    for k in doubts:
+        distance, reading = row.distance[begin + k], row.reading[begin + k]
         far = distance + half
-        free, reading = way[k] >= far, readings[k]
+        free = row.way[begin + k] >= far
         # A reading that is too short leaves cells without evidence as they are.
-        if free or reading > far or (evidence[k] > 0.0 and reading > -np.inf):
+        if not free and (reading > far or (evidence[k] > 0.0 and reading > -np.inf)):
             until = rolled_m + lasting(distance + from_axle, error)
-            if not free:
-                if evidence[k] == 0.0:
-                    evident_until[k] = np.inf
-                z = (reading - far) / sigma
-                evidence[k] = max(evidence[k] + z - 0.5, 0.0)
-                evident_until[k] = until = min(evident_until[k], until)
-                free = evidence[k] >= _EVIDENCE
+            if evidence[k] == 0.0:
+                evident_until[k] = np.inf
+            z = (reading - far) / sigma
+            evidence[k] = max(evidence[k] + z - 0.5, 0.0)
+            evident_until[k] = until = min(evident_until[k], until)
+            free = evidence[k] >= _EVIDENCE
             if free:
                 free_until[k] = max(free_until[k], until)
-                hits[k], evidence[k] = 0.0, 0.0
-        if not free and abs(distance - echo[k]) <= half:
+        if free:
+            hits[k], evidence[k] = 0.0, 0.0
+        elif abs(distance - row.echo[begin + k]) <= half:
             hits[k] += min(1.0, _FULL_HIT_M / distance)
 
 
