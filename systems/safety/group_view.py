@@ -226,42 +226,54 @@ def look_along_row(
         view: What the group has seen.
         row: Arrays that the function fills for each cell.
     """
-    half, edges, cuts = cell * math.sqrt(0.5), view.edges, view.cuts
+    half, edges = cell * math.sqrt(0.5), view.edges
     own = 0 if dx >= 0.0 else 1
     for side in (own, 1 - own):
         # A circle that contains a part of the y-axis can meet edges on both sides.
         if side != own and abs(dx) > half:
             break
         size = view.sizes[side]
-        _cut_row(dx, begin_y, cell, float(count), side, size, edges, cuts)
+        _cut_row(dx, begin_y, cell, float(count), side, size, edges, view.cuts)
         if side == own:
-            _fill_row(view.seen, side, cuts, size, row, count)
-        # The cells whose circles meet an edge.
-        for k in range(size):
-            way, reading = edges[side, 4, k], edges[side, 5, k]
-            for n in range(int(cuts[1, k]), int(cuts[2, k])):
-                row.way[n] = min(row.way[n], way)
-                row.reading[n] = min(row.reading[n], reading)
-                if way == _OUT_OF_VIEW:
-                    row.echo[n] = np.inf
+            _fill_row(view, side, row, count)
+        _meet_edges(view, side, row)
 
 
-@register_jitable
+@njit(cache=True, error_model="numpy")
 def _fill_row(
-    seen: Any, side: int, cuts: Any, size: int, row: RowView, count: int
-) -> None:
+    view: GroupView, side: int, row: RowView, count: int
+) -> None:  # pragma: no cover  (compiled)
     """Enters the sector that contains the middle of each cell.
 
     The loops have no branches, which the processor would have to predict.
     """
-    for k in range(size):
-        row.begins[int(cuts[0, k])] = k + 1
+    begins, seen, cuts = row.begins, view.seen, view.cuts
+    ways, readings, echoes = row.way, row.reading, row.echo
+    for k in range(view.sizes[side]):
+        begins[int(cuts[0, k])] += 1
     sector = 0
     for n in range(count):
-        sector, row.begins[n] = max(sector, row.begins[n]), 0
-        row.way[n], row.reading[n] = seen[side, sector, 0], seen[side, sector, 1]
-        row.echo[n] = seen[side, sector, 2]
-    row.begins[count] = 0
+        sector += begins[n]
+        begins[n] = 0
+        ways[n], readings[n] = seen[side, sector, 0], seen[side, sector, 1]
+        echoes[n] = seen[side, sector, 2]
+    begins[count] = 0
+
+
+@njit(cache=True, error_model="numpy")
+def _meet_edges(
+    view: GroupView, side: int, row: RowView
+) -> None:  # pragma: no cover  (compiled)
+    """Enters the sectors on both sides of an edge that the circle of a cell meets."""
+    edges, cuts = view.edges, view.cuts
+    ways, readings, echoes = row.way, row.reading, row.echo
+    for k in range(view.sizes[side]):
+        way, reading = edges[side, 4, k], edges[side, 5, k]
+        for n in range(int(cuts[1, k]), int(cuts[2, k])):
+            ways[n] = min(ways[n], way)
+            readings[n] = min(readings[n], reading)
+            if way == _OUT_OF_VIEW:
+                echoes[n] = np.inf
 
 
 @njit(cache=True, error_model="numpy")

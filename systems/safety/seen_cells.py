@@ -105,16 +105,14 @@ def see(
             count = min(high_j, math.floor((sy + reach) / cell)) - first + 1
             if count <= 0:
                 continue
-            for k in range(count):
-                dy = (first + k + 0.5) * cell - sy
-                row.distance[k] = math.sqrt(dx * dx + dy * dy)
             look_along_row(dx, (first + 0.5) * cell - sy, cell, count, view, row)
             # The map stores the row in two pieces, because its indices wrap around.
             at, turned = first % cells, i % cells
             piece = min(count, cells - at)
             for begin, end, at in ((0, piece, at), (piece, count, 0)):
                 which = begin, end, turned, at
-                _enter_free(space, which, row, from_axle, error)
+                place = dx, sy, first
+                _enter_free(space, which, place, row, from_axle, error)
                 doubts = _find_doubts(space, which, row, found)
                 _enter_doubts(space, which, row, found[:doubts], sigma, from_axle, error)
 
@@ -130,7 +128,12 @@ def _greatest(seen: Any, begin: int, end: int, column: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _enter_free(
-    space: FreeSpace, piece: Any, row: RowView, from_axle: float, error: Any
+    space: FreeSpace,
+    piece: Any,
+    place: Any,
+    row: RowView,
+    from_axle: float,
+    error: Any,
 ) -> None:  # pragma: no cover  (compiled)
     """Marks cells as free that a group of sensors has seen free in one look.
 
@@ -139,14 +142,18 @@ def _enter_free(
     branches, so that the processor computes several cells at once.
     """
     begin, end, i, at = piece
-    half, rolled_m = space.cell_m * math.sqrt(0.5), space.rolled_m[0]
+    (dx, sy, first), cell = place, space.cell_m
+    half, rolled_m = cell * math.sqrt(0.5), space.rolled_m[0]
     free_until = space.free_until[i, at : at + end - begin]
     ways, distances = row.way[begin:end], row.distance[begin:end]
+    first += begin
     for k in range(end - begin):
-        distance = distances[k]
+        dy = (first + k + 0.5) * cell - sy
+        distance = math.sqrt(dx * dx + dy * dy)
         free = (ways[k] >= distance + half) & (distance >= 2.0 * half)
         until = max(free_until[k], rolled_m + lasting(distance + from_axle, error))
         free_until[k] = until if free else free_until[k]
+        distances[k] = distance
 
 
 @njit(cache=True, error_model="numpy")
@@ -164,17 +171,14 @@ def _find_doubts(
     ways, distances = row.way[begin:end], row.distance[begin:end]
     readings, echoes, doubts = row.reading[begin:end], row.echo[begin:end], row.doubt
     for k in range(count):
-        distance = distances[k]
-        far = distance + half
-        echoes_here = abs(distance - echoes[k]) <= half
-        doubt = (hits[k] > 0.0) & (ways[k] >= far)
-        doubt |= (echoes_here | (readings[k] > far)) & (ways[k] < far)
-        doubt |= evidence[k] > 0.0
-        doubts[k] = 1.0 if doubt & (distance >= 2.0 * half) else 0.0
+        distance, far = distances[k], distances[k] + half
+        doubt = max(readings[k] - far, 1.001 * half - abs(distance - echoes[k]))
+        doubt = hits[k] if ways[k] >= far else doubt
+        doubts[k] = max(doubt, evidence[k])
     number = 0
     for k in range(count):
         found[number] = k
-        number += int(doubts[k])
+        number += int(doubts[k] > 0.0)
     return number
 
 
@@ -199,6 +203,8 @@ def _enter_doubts(
         distance, reading = row.distance[begin + k], row.reading[begin + k]
         far = distance + half
         free = row.way[begin + k] >= far
+        if distance < 2.0 * half:
+            continue
         # A reading that is too short leaves cells without evidence as they are.
         if not free and (reading > far or (evidence[k] > 0.0 and reading > -np.inf)):
             until = rolled_m + lasting(distance + from_axle, error)
