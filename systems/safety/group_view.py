@@ -239,7 +239,7 @@ def look_along_row(
         _meet_edges(view, side, row)
 
 
-@njit(cache=True, error_model="numpy")
+@register_jitable(inline="always")
 def _fill_row(
     view: GroupView, side: int, row: RowView, count: int
 ) -> None:  # pragma: no cover  (compiled)
@@ -260,7 +260,7 @@ def _fill_row(
     begins[count] = 0
 
 
-@njit(cache=True, error_model="numpy")
+@register_jitable(inline="always")
 def _meet_edges(
     view: GroupView, side: int, row: RowView
 ) -> None:  # pragma: no cover  (compiled)
@@ -276,7 +276,7 @@ def _meet_edges(
                 echoes[n] = np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@register_jitable(inline="always")
 def _cut_row(
     dx: float,
     begin_y: float,
