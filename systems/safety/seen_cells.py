@@ -82,7 +82,6 @@ def see(
         np.empty(cells),
         np.zeros(cells + 1, np.int64),
     )
-    found = np.empty(cells, np.int64)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
@@ -113,8 +112,7 @@ def see(
                 which = begin, end, turned, at
                 place = dx, sy, first
                 _enter_free(space, which, place, row, from_axle, error)
-                doubts = _find_doubts(space, which, row, found)
-                _enter_doubts(space, which, row, found[:doubts], sigma, from_axle, error)
+                _enter_doubts(space, which, row, sigma, from_axle, error)
 
 
 @register_jitable
@@ -157,9 +155,14 @@ def _enter_free(
 
 
 @njit(cache=True, error_model="numpy")
-def _find_doubts(
-    space: FreeSpace, piece: Any, row: RowView, found: Any
-) -> int:  # pragma: no cover  (compiled)
+def _enter_doubts(
+    space: FreeSpace,
+    piece: Any,
+    row: RowView,
+    sigma: float,
+    from_axle: float,
+    error: Any,
+) -> None:  # pragma: no cover  (compiled)
     """Lists the cells of which hits or evidence may change.
 
     Returns their number. ``found`` gets their indices in the piece; see
@@ -167,6 +170,9 @@ def _find_doubts(
     """
     begin, end, i, at = piece
     half, count = space.cell_m * math.sqrt(0.5), end - begin
+    rolled_m = space.rolled_m[0]
+    free_until = space.free_until[i, at : at + count]
+    evident_until = space.evident_until[i, at : at + count]
     hits, evidence = space.hits[i, at : at + count], space.evidence[i, at : at + count]
     ways, distances = row.way[begin:end], row.distance[begin:end]
     readings, echoes, doubts = row.reading[begin:end], row.echo[begin:end], row.doubt
@@ -175,34 +181,12 @@ def _find_doubts(
         doubt = max(readings[k] - far, 1.001 * half - abs(distance - echoes[k]))
         doubt = hits[k] if ways[k] >= far else doubt
         doubts[k] = max(doubt, evidence[k])
-    number = 0
     for k in range(count):
-        found[number] = k
-        number += int(doubts[k] > 0.0)
-    return number
-
-
-@njit(cache=True, error_model="numpy")
-def _enter_doubts(
-    space: FreeSpace,
-    piece: Any,
-    row: RowView,
-    doubts: Any,
-    sigma: float,
-    from_axle: float,
-    error: Any,
-) -> None:  # pragma: no cover  (compiled)
-    """Changes hits and evidence of the cells in ``doubts``; see ``see``."""
-    begin, end, i, at = piece
-    half, rolled_m = space.cell_m * math.sqrt(0.5), space.rolled_m[0]
-    free_until = space.free_until[i, at : at + end - begin]
-    hits = space.hits[i, at : at + end - begin]
-    evidence = space.evidence[i, at : at + end - begin]
-    evident_until = space.evident_until[i, at : at + end - begin]
-    for k in doubts:
-        distance, reading = row.distance[begin + k], row.reading[begin + k]
+        if doubts[k] <= 0.0:
+            continue
+        distance, reading = distances[k], readings[k]
         far = distance + half
-        free = row.way[begin + k] >= far
+        free = ways[k] >= far
         if distance < 2.0 * half:
             continue
         # A reading that is too short leaves cells without evidence as they are.
@@ -218,7 +202,7 @@ def _enter_doubts(
                 free_until[k] = max(free_until[k], until)
         if free:
             hits[k], evidence[k] = 0.0, 0.0
-        elif abs(distance - row.echo[begin + k]) <= half:
+        elif abs(distance - echoes[k]) <= half:
             hits[k] += min(1.0, _FULL_HIT_M / distance)
 
 
