@@ -94,10 +94,23 @@ class RowView(NamedTuple):
     echo: NDArray[np.float64]
     """(m,) distance of the nearest echo, m."""
     doubt: NDArray[np.float64]
-    """(m,) scratch."""
+    """(m,) scratch memory for the cells that may change."""
     begins: NDArray[np.int64]
-    """(m + 1,) scratch memory for the sectors that begin at the cells. It is 0 between
-    two calls of ``look_along_row``."""
+    """(m + 1,) scratch memory for the number of sectors that begin at each cell. It is
+    0 between two calls of ``look_along_row``."""
+
+
+@register_jitable
+def row_view(cells: int) -> RowView:
+    """Makes the arrays of ``RowView`` for a number of cells."""
+    return RowView(
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.zeros(cells + 1, np.int64),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -232,6 +245,8 @@ def look_along_row(
         # A circle that contains a part of the y-axis can meet edges on both sides.
         if side != own and abs(dx) > half:
             break
+        # numba would count the references to all arrays at each call of a function that
+        # is not inlined.
         size = view.sizes[side]
         _cut_row(dx, begin_y, cell, float(count), side, size, edges, view.cuts)
         if side == own:
@@ -294,7 +309,8 @@ def _cut_row(
     has no branches, which the loops over cells would have to wait for.
     """
     for k in range(size):
-        middle, behind, wide = dx * edges[side, 1, k], -dx * edges[side, 2, k], edges[side, 3, k]
+        middle, behind = dx * edges[side, 1, k], -dx * edges[side, 2, k]
+        wide = edges[side, 3, k]
         low, high, ahead = middle - wide, middle + wide, edges[side, 0, k] > 0.0
         low = max(low, behind) if ahead else low
         high = high if ahead else min(high, behind)

@@ -14,6 +14,7 @@ from systems.safety.group_view import (
     RowView,
     group_view,
     look_along_row,
+    row_view,
     seen_in_sectors,
 )
 from systems.safety.views import Sectors, lasting
@@ -74,14 +75,7 @@ def see(
     # Radius of the circle around a cell.
     half = cell * math.sqrt(0.5)
     seen = seen_in_sectors(sectors, readings)
-    row = RowView(
-        np.empty(cells),
-        np.empty(cells),
-        np.empty(cells),
-        np.empty(cells),
-        np.empty(cells),
-        np.zeros(cells + 1, np.int64),
-    )
+    row = row_view(cells)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
@@ -106,13 +100,15 @@ def see(
                 continue
             look_along_row(dx, (first + 0.5) * cell - sy, cell, count, view, row)
             # The map stores the row in two pieces, because its indices wrap around.
-            at, turned = first % cells, i % cells
-            piece = min(count, cells - at)
-            for begin, end, at in ((0, piece, at), (piece, count, 0)):
-                which = begin, end, turned, at
-                place = dx, sy, first
-                _enter_free(space, which, place, row, from_axle, error)
-                _enter_doubts(space, which, row, sigma, from_axle, error)
+            at, place = first % cells, (dx, sy, first)
+            stop = min(count, cells - at)
+            piece = 0, stop, i % cells, at
+            _enter_free(space, piece, row, place, from_axle, error)
+            _enter_doubts(space, piece, row, from_axle, error, sigma)
+            if stop < count:
+                piece = stop, count, i % cells, 0
+                _enter_free(space, piece, row, place, from_axle, error)
+                _enter_doubts(space, piece, row, from_axle, error, sigma)
 
 
 @register_jitable
@@ -128,25 +124,29 @@ def _greatest(seen: Any, begin: int, end: int, column: int) -> float:
 def _enter_free(
     space: FreeSpace,
     piece: Any,
-    place: Any,
     row: RowView,
+    place: Any,
     from_axle: float,
     error: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Marks cells as free that a group of sensors has seen free in one look.
+    """Marks the cells of a row that the newest readings alone have seen free.
 
-    ``piece`` has the indices of the first cell in ``row``, of the cell after the last,
-    and of the row and of the first cell in the arrays of the map. The loop has no
-    branches, so that the processor computes several cells at once.
+    The function also computes the distances of the cells. Its loop has no branches, so
+    that the processor computes several cells at once.
+
+    ``piece`` has four indices: of the first cell of the piece in ``row``, of the cell
+    after its last, of the row in the arrays of the map, and of the first cell there.
+    ``place`` has the position of the row relative to the group along x, m, the position
+    of the group along y, m, and the index on the floor of the first cell of ``row``.
+    ``from_axle`` is the distance of the group from the axle, m.
     """
     begin, end, i, at = piece
     (dx, sy, first), cell = place, space.cell_m
     half, rolled_m = cell * math.sqrt(0.5), space.rolled_m[0]
     free_until = space.free_until[i, at : at + end - begin]
     ways, distances = row.way[begin:end], row.distance[begin:end]
-    first += begin
     for k in range(end - begin):
-        dy = (first + k + 0.5) * cell - sy
+        dy = (first + begin + k + 0.5) * cell - sy
         distance = math.sqrt(dx * dx + dy * dy)
         free = (ways[k] >= distance + half) & (distance >= 2.0 * half)
         until = max(free_until[k], rolled_m + lasting(distance + from_axle, error))
@@ -159,44 +159,43 @@ def _enter_doubts(
     space: FreeSpace,
     piece: Any,
     row: RowView,
-    sigma: float,
     from_axle: float,
     error: Any,
+    sigma: float,
 ) -> None:  # pragma: no cover  (compiled)
-    """Lists the cells of which hits or evidence may change.
+    """Changes the hits and the evidence of the cells of a row.
 
-    Returns their number. ``found`` gets their indices in the piece; see
-    ``_enter_free``.
+    See ``_enter_free`` for the arguments. ``sigma`` is the standard deviation of the
+    noise, m.
     """
     begin, end, i, at = piece
-    half, count = space.cell_m * math.sqrt(0.5), end - begin
-    rolled_m = space.rolled_m[0]
-    free_until = space.free_until[i, at : at + count]
-    evident_until = space.evident_until[i, at : at + count]
-    hits, evidence = space.hits[i, at : at + count], space.evidence[i, at : at + count]
-    ways, distances = row.way[begin:end], row.distance[begin:end]
-    readings, echoes, doubts = row.reading[begin:end], row.echo[begin:end], row.doubt
+    count, stop = end - begin, at + end - begin
+    half, rolled_m = space.cell_m * math.sqrt(0.5), space.rolled_m[0]
+    free_until, hits = space.free_until[i, at:stop], space.hits[i, at:stop]
+    evidence, valid_until = space.evidence[i, at:stop], space.evident_until[i, at:stop]
+    ways, readings = row.way[begin:end], row.reading[begin:end]
+    echoes, distances = row.echo[begin:end], row.distance[begin:end]
+    doubts = row.doubt
+    # Few cells have anything to change. This loop without branches finds them, and a
+    # few more at the ends of echoes.
     for k in range(count):
-        distance, far = distances[k], distances[k] + half
-        doubt = max(readings[k] - far, 1.001 * half - abs(distance - echoes[k]))
-        doubt = hits[k] if ways[k] >= far else doubt
-        doubts[k] = max(doubt, evidence[k])
+        far, behind = distances[k] + half, abs(distances[k] - echoes[k])
+        doubt = max(readings[k] - far, 1.001 * half - behind)
+        doubts[k] = max(hits[k] if ways[k] >= far else doubt, evidence[k])
     for k in range(count):
-        if doubts[k] <= 0.0:
+        distance = distances[k]
+        if doubts[k] <= 0.0 or distance < 2.0 * half:
             continue
-        distance, reading = distances[k], readings[k]
-        far = distance + half
+        far, reading = distance + half, readings[k]
         free = ways[k] >= far
-        if distance < 2.0 * half:
-            continue
         # A reading that is too short leaves cells without evidence as they are.
         if not free and (reading > far or (evidence[k] > 0.0 and reading > -np.inf)):
-            until = rolled_m + lasting(distance + from_axle, error)
             if evidence[k] == 0.0:
-                evident_until[k] = np.inf
+                valid_until[k] = np.inf
             z = (reading - far) / sigma
             evidence[k] = max(evidence[k] + z - 0.5, 0.0)
-            evident_until[k] = until = min(evident_until[k], until)
+            until = rolled_m + lasting(distance + from_axle, error)
+            valid_until[k] = until = min(valid_until[k], until)
             free = evidence[k] >= _EVIDENCE
             if free:
                 free_until[k] = max(free_until[k], until)
