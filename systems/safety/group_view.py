@@ -40,8 +40,9 @@ def seen_in_sectors(
         seen[k, 0], seen[k, 1], seen[k, 3], seen[k, 4] = 0.0, np.inf, -np.inf, 1.0
     last = -1
     for n in range(len(sectors.pairs)):
-        k, sensor = sectors.pairs[n]
-        free, echo, reading, noise_m = readings[sensor]
+        k, sensor = sectors.pairs[n, 0], sectors.pairs[n, 1]
+        free, echo = readings[sensor, 0], readings[sensor, 1]
+        reading, noise_m = readings[sensor, 2], readings[sensor, 3]
         if k != last and noise_m > 0.0:
             seen[k, 3], seen[k, 4] = reading, noise_m
         seen[k, 0], seen[k, 1] = max(seen[k, 0], free), min(seen[k, 1], echo)
@@ -58,26 +59,58 @@ class GroupView(NamedTuple):
     """View of a group of sensors as sectors that fill the full circle.
 
     Neighboring sectors have seen different distances. If the group does not see all
-    around, one sector is out of view. The arrays may have room for more sectors.
+    around, one sector is out of view.
+
+    A row of cells is parallel to the y-axis of the frame of the odometry. In the order
+    of increasing y, it crosses the edges of sectors on its side of the group: on side
+    0, where x is positive, counterclockwise, and on side 1 clockwise. The arrays may
+    have room for more sectors.
     """
 
-    size: int
-    """Number of sectors."""
+    sizes: NDArray[np.int64]
+    """(2,) number of edges on each side."""
     seen: NDArray[np.float64]
-    """(n, 3) distance seen free, distance of the echo, and reading less all errors but
-    noise in each sector, m."""
-    begin: float
-    """Direction of the right edge of the first sector in the frame of the odometry,
-    rad."""
-    turns: NDArray[np.float64]
-    """(n,) angle from there to the right edge of each sector, counterclockwise, rad."""
+    """(2, n + 1, 3) distance seen free, reading less all errors but noise, and distance
+    of the echo in each sector on a side, m. The first sector contains the direction of
+    -y. Each edge begins the next sector."""
     edges: NDArray[np.float64]
-    """(7, n) right edge of each sector: cosine, sine, tangent, and cotangent of its
-    direction in the frame of the odometry; half of the length of the part of a row
-    within the radius of a cell's circle from the edge, m; and the smaller of the
-    distances seen free and of the readings on both sides, m."""
+    """(2, 6, n) sine, tangent, and cotangent of the direction of each edge; half of the
+    length of the part of a row within the radius of a cell's circle from the edge, m;
+    and the smaller of the distances seen free and of the readings beside the edge, m.
+    """
     cuts: NDArray[np.float64]
     """(3, n) scratch memory for the cells at the edges, see ``_cut_row``."""
+
+
+class RowView(NamedTuple):
+    """What a group of sensors has seen toward the cells of a row."""
+
+    distance: NDArray[np.float64]
+    """(m,) distance of the middle of the cell from the group, m."""
+    way: NDArray[np.float64]
+    """(m,) distance seen free, m."""
+    reading: NDArray[np.float64]
+    """(m,) reading less all errors but noise, m."""
+    echo: NDArray[np.float64]
+    """(m,) distance of the nearest echo, m."""
+    doubt: NDArray[np.float64]
+    """(m,) scratch memory for the cells that may change."""
+    begins: NDArray[np.int64]
+    """(m + 1,) scratch memory for the number of sectors that begin at each cell. It is
+    0 between two calls of ``look_along_row``."""
+
+
+@register_jitable
+def row_view(cells: int) -> RowView:
+    """Makes the arrays of ``RowView`` for a number of cells."""
+    return RowView(
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.empty(cells),
+        np.zeros(cells + 1, np.int64),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -99,31 +132,45 @@ def group_view(
     """
     start, stop = sectors.right[begin, 0], sectors.left[end - 1, 0]
     most, count = end - begin + 1, 0
-    views, turns, edges = np.empty((most, 3)), np.empty(most), np.empty((7, most))
+    views, cosines, sines = np.empty((most, 3)), np.empty(most), np.empty(most)
     for k in range(begin, end + 1):
-        angle, way, echo, reading = stop, _OUT_OF_VIEW, np.inf, -np.inf
+        angle, way, reading, echo = stop, _OUT_OF_VIEW, -np.inf, np.inf
         if k < end:
-            angle, reading = sectors.right[k, 0], seen[k, 3]
-            way, echo = seen[k, 0], seen[k, 1]
+            angle, way = sectors.right[k, 0], seen[k, 0]
+            reading, echo = seen[k, 3], seen[k, 1]
         elif stop - start > math.tau - 1e-9:
             break  # the group sees all around
-        if count > 0:
-            last = views[count - 1]
-            if way == last[0] and echo == last[1] and reading == last[2]:
-                continue
-        views[count, 0], views[count, 1], views[count, 2] = way, echo, reading
-        cosine = _not_zero(math.cos(heading + angle))
-        sine = _not_zero(math.sin(heading + angle))
-        edges[0, count], edges[1, count] = cosine, sine
-        edges[2, count], edges[3, count] = sine / cosine, cosine / sine
-        edges[4, count], turns[count] = half / abs(cosine), angle - start
+        n = max(count - 1, 0)
+        same = way == views[n, 0] and reading == views[n, 1] and echo == views[n, 2]
+        if count > 0 and same:
+            continue
+        views[count, 0], views[count, 1], views[count, 2] = way, reading, echo
+        cosines[count] = _not_zero(math.cos(heading + angle))
+        sines[count] = _not_zero(math.sin(heading + angle))
         count += 1
-    for k in range(count):
-        other = k - 1 if k > 0 else count - 1
-        edges[5, k] = min(views[k, 0], views[other, 0])
-        edges[6, k] = min(views[k, 2], views[other, 2])
-    begin_at, cuts = heading + start, np.empty((3, most))
-    return GroupView(count, views, begin_at, turns, edges, cuts)
+    view = GroupView(
+        np.zeros(2, np.int64),
+        np.empty((2, most + 1, 3)),
+        np.empty((2, 6, most)),
+        np.empty((3, most)),
+    )
+    sector = _sector_of_minus_y(cosines, sines, count)
+    for n in range(3):
+        view.seen[0, 0, n] = view.seen[1, 0, n] = views[sector, n]
+    for n in range(1, count + 1):
+        # Edge k is between the sectors k - 1 and k.
+        k = (sector + n) % count
+        if cosines[k] < 0.0:
+            break
+        before = k - 1 if k > 0 else count - 1
+        _add_edge(view, 0, cosines[k], sines[k], views, before, k, half)
+    for n in range(count):
+        k = (sector - n) % count
+        if cosines[k] > 0.0:
+            break
+        behind = k - 1 if k > 0 else count - 1
+        _add_edge(view, 1, cosines[k], sines[k], views, k, behind, half)
+    return view
 
 
 @register_jitable
@@ -131,9 +178,51 @@ def _not_zero(value: float) -> float:
     return math.copysign(max(abs(value), 1e-12), value)
 
 
+@register_jitable
+def _sector_of_minus_y(cosines: Any, sines: Any, count: int) -> int:
+    """Finds the sector that contains the direction of -y.
+
+    From the right edge of this sector to the left, x becomes positive or the tangent of
+    the direction decreases.
+    """
+    for k in range(count):
+        left = k + 1 if k + 1 < count else 0
+        falls = sines[left] / cosines[left] <= sines[k] / cosines[k]
+        was_ahead, is_ahead = cosines[k] > 0.0, cosines[left] > 0.0
+        if (is_ahead and not was_ahead) or (is_ahead == was_ahead and falls):
+            return k
+    return 0
+
+
+@register_jitable
+def _add_edge(
+    view: GroupView,
+    side: int,
+    cosine: float,
+    sine: float,
+    views: Any,
+    before: int,
+    behind: int,
+    half: float,
+) -> None:
+    """Adds an edge to a side of a view, and the sector behind it.
+
+    ``before`` and ``behind`` are the indices of the sectors beside the edge, in the
+    order of a row.
+    """
+    n, edges = view.sizes[side], view.edges
+    edges[side, 0, n], edges[side, 1, n] = sine, sine / cosine
+    edges[side, 2, n], edges[side, 3, n] = cosine / sine, half / abs(cosine)
+    for m in range(2):
+        edges[side, 4 + m, n] = min(views[before, m], views[behind, m])
+    for m in range(3):
+        view.seen[side, n + 1, m] = views[behind, m]
+    view.sizes[side] = n + 1
+
+
 @njit(cache=True, error_model="numpy")
 def look_along_row(
-    dx: float, begin_y: float, cell: float, view: GroupView, row: Any
+    dx: float, begin_y: float, cell: float, count: int, view: GroupView, row: RowView
 ) -> None:  # pragma: no cover  (compiled)
     """Computes how far a group of sensors has seen toward the cells of a row.
 
@@ -146,64 +235,83 @@ def look_along_row(
         dx: Position of the row relative to the group, m.
         begin_y: Position of the middle of the first cell relative to the group, m.
         cell: Side of a cell, m.
+        count: Number of cells.
         view: What the group has seen.
-        row: (m, 4) array whose first three columns the function fills with distance
-            seen free, reading, and echo for each cell, m.
+        row: Arrays that the function fills for each cell.
     """
-    seen, edges, cuts, count = view.seen, view.edges, view.cuts, len(row)
-    size, half = view.size, cell * math.sqrt(0.5)
-    _cut_row(dx, begin_y, cell, float(count), size, edges, cuts)
-    # Along the row, the direction turns to the left for dx > 0, and otherwise to the
-    # right. ``slope`` grows.
-    sense = 1.0 if dx >= 0.0 else -1.0
-    slope = begin_y / max(abs(dx), 1e-12)
-    slope -= 1e-9 * (1.0 + abs(slope))
-    turn = math.atan2(begin_y, dx) - view.begin
-    turn -= math.tau * math.floor(turn / math.tau)
-    sector, k = int(np.searchsorted(view.turns[:size], turn, side="right")) - 1, 0
-    while k < count:
-        next_edge, end = sector, count
-        if sense > 0.0:
-            next_edge = sector + 1 if sector + 1 < size else 0
-        cosine, tangent = edges[0, next_edge], edges[2, next_edge]
-        if sense * cosine > 0.0 and sense * tangent > slope:
-            slope = sense * tangent
-            end = max(int(cuts[0, next_edge]), k)
-        way, echo, reading = seen[sector, 0], seen[sector, 1], seen[sector, 2]
-        for n in range(k, end):
-            row[n, 0], row[n, 1], row[n, 2], row[n, 3] = way, reading, echo, 0.0
-        k = end
-        sector = next_edge if sense > 0.0 else (sector or size) - 1
-    # The cells whose circles meet an edge.
-    for k in range(size):
-        if abs(dx) > half and (edges[0, k] > 0.0) != (dx > 0.0):
-            continue
-        both, reading = edges[5, k], edges[6, k]
+    half, edges = cell * math.sqrt(0.5), view.edges
+    own = 0 if dx >= 0.0 else 1
+    for side in (own, 1 - own):
+        # A circle that contains a part of the y-axis can meet edges on both sides.
+        if side != own and abs(dx) > half:
+            break
+        # numba would count the references to all arrays at each call of a function that
+        # is not inlined.
+        size = view.sizes[side]
+        _cut_row(dx, begin_y, cell, float(count), side, size, edges, view.cuts)
+        if side == own:
+            _fill_row(view, side, row, count)
+        _meet_edges(view, side, row)
+
+
+@register_jitable(inline="always")
+def _fill_row(
+    view: GroupView, side: int, row: RowView, count: int
+) -> None:  # pragma: no cover  (compiled)
+    """Enters the sector that contains the middle of each cell.
+
+    The loops have no branches, which the processor would have to predict.
+    """
+    begins, seen, cuts = row.begins, view.seen, view.cuts
+    ways, readings, echoes = row.way, row.reading, row.echo
+    for k in range(view.sizes[side]):
+        begins[int(cuts[0, k])] += 1
+    sector = 0
+    for n in range(count):
+        sector += begins[n]
+        begins[n] = 0
+        ways[n], readings[n] = seen[side, sector, 0], seen[side, sector, 1]
+        echoes[n] = seen[side, sector, 2]
+    begins[count] = 0
+
+
+@register_jitable(inline="always")
+def _meet_edges(
+    view: GroupView, side: int, row: RowView
+) -> None:  # pragma: no cover  (compiled)
+    """Enters the sectors on both sides of an edge that the circle of a cell meets."""
+    edges, cuts = view.edges, view.cuts
+    ways, readings, echoes = row.way, row.reading, row.echo
+    for k in range(view.sizes[side]):
+        way, reading = edges[side, 4, k], edges[side, 5, k]
         for n in range(int(cuts[1, k]), int(cuts[2, k])):
-            row[n, 0], row[n, 1] = min(row[n, 0], both), min(row[n, 1], reading)
-            if both == _OUT_OF_VIEW:
-                row[n, 2] = np.inf
+            ways[n] = min(ways[n], way)
+            readings[n] = min(readings[n], reading)
+            if way == _OUT_OF_VIEW:
+                echoes[n] = np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@register_jitable(inline="always")
 def _cut_row(
     dx: float,
     begin_y: float,
     cell: float,
     count: float,
+    side: int,
     size: int,
     edges: Any,
     cuts: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Computes at which cells of a row the edges of the sectors are.
+    """Computes at which cells of a row the edges of a side are.
 
-    The results are whole numbers from 0 to ``count``: the first cell whose middle is
-    behind the edge, and the first and the last cell, plus 1, whose circles meet it.
-    This loop has no branches, which the loops over cells would have to wait for.
+    The results are numbers from 0 to ``count``: the first cell whose middle is behind
+    the edge, and the first and the last cell, plus 1, whose circles meet it. This loop
+    has no branches, which the loops over cells would have to wait for.
     """
     for k in range(size):
-        middle, behind, wide = dx * edges[2, k], -dx * edges[3, k], edges[4, k]
-        low, high, ahead = middle - wide, middle + wide, edges[1, k] > 0.0
+        middle, behind = dx * edges[side, 1, k], -dx * edges[side, 2, k]
+        wide = edges[side, 3, k]
+        low, high, ahead = middle - wide, middle + wide, edges[side, 0, k] > 0.0
         low = max(low, behind) if ahead else low
         high = high if ahead else min(high, behind)
         first = np.ceil((middle - begin_y) / cell)

@@ -10,7 +10,13 @@ from numba.extending import register_jitable
 
 from systems.framework.compiling import njit
 from systems.safety.free_space import FreeSpace, cells_within
-from systems.safety.group_view import group_view, look_along_row, seen_in_sectors
+from systems.safety.group_view import (
+    RowView,
+    group_view,
+    look_along_row,
+    row_view,
+    seen_in_sectors,
+)
 from systems.safety.views import Sectors, lasting
 
 register_jitable(lasting)
@@ -69,22 +75,21 @@ def see(
     # Radius of the circle around a cell.
     half = cell * math.sqrt(0.5)
     seen = seen_in_sectors(sectors, readings)
-    row, distances = np.empty((cells, 4)), np.empty(cells)
+    row = row_view(cells)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for group in range(len(sectors.places)):
         begin, end = sectors.first[group], sectors.first[group + 1]
-        ahead, aside = sectors.places[group]
+        ahead, aside = sectors.places[group, 0], sectors.places[group, 1]
         # Position of the group in the frame of the odometry.
         sx, sy = pose[0] + c * ahead - s * aside, pose[1] + s * ahead + c * aside
         right, left = sectors.right[begin, 0], sectors.left[end - 1, 0]
         from_axle = math.hypot(ahead, aside)
-        farthest = np.max(seen[begin:end, 2])
+        farthest, sigma = _greatest(seen, begin, end, 2), _greatest(seen, begin, end, 4)
         low_x, low_y, high_x, high_y = _sector_box(
             sx, sy, pose[2] + right, pose[2] + left, farthest + cell
         )
         low_i, low_j, high_i, high_j = cells_within(space, low_x, low_y, high_x, high_y)
         view = group_view(sectors, seen, begin, end, pose[2], half)
-        sigma = np.max(seen[begin:end, 4])
         for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
             dx = (i + 0.5) * cell - sx
             # The cells of the row that are not too far away.
@@ -93,65 +98,110 @@ def see(
             count = min(high_j, math.floor((sy + reach) / cell)) - first + 1
             if count <= 0:
                 continue
-            for k in range(count):
-                dy = (first + k + 0.5) * cell - sy
-                distances[k] = math.sqrt(dx * dx + dy * dy)
-            begin_y = (first + 0.5) * cell - sy
-            look_along_row(dx, begin_y, cell, view, row[:count])
+            look_along_row(dx, (first + 0.5) * cell - sy, cell, count, view, row)
             # The map stores the row in two pieces, because its indices wrap around.
-            at = first % cells
-            piece, turned = min(count, cells - at), i % cells
-            of_row = row[:piece], distances[:piece]
-            _enter_row(space, turned, at, of_row, sigma, from_axle, error)
-            if piece < count:
-                of_row = row[piece:count], distances[piece:count]
-                _enter_row(space, turned, 0, of_row, sigma, from_axle, error)
+            at, place = first % cells, (dx, sy, first)
+            stop = min(count, cells - at)
+            piece = 0, stop, i % cells, at
+            _enter_free(space, piece, row, place, from_axle, error)
+            _enter_doubts(space, piece, row, from_axle, error, sigma)
+            if stop < count:
+                piece = stop, count, i % cells, 0
+                _enter_free(space, piece, row, place, from_axle, error)
+                _enter_doubts(space, piece, row, from_axle, error, sigma)
+
+
+@register_jitable
+def _greatest(seen: Any, begin: int, end: int, column: int) -> float:
+    """Returns the largest number in some rows of a column."""
+    greatest = seen[begin, column]
+    for k in range(begin + 1, end):
+        greatest = max(greatest, seen[k, column])
+    return greatest
 
 
 @njit(cache=True, error_model="numpy")
-def _enter_row(
+def _enter_free(
     space: FreeSpace,
-    i: int,
-    first: int,
-    of_row: Any,
-    sigma: float,
+    piece: Any,
+    row: RowView,
+    place: Any,
     from_axle: float,
     error: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Changes the cells of a row of the map; see ``see``.
+    """Marks the cells of a row that the newest readings alone have seen free.
 
-    ``i`` is the row of the arrays, and ``first`` the first cell in it. ``of_row`` has
-    what the group has seen toward each cell (see ``look_along_row``), and the
-    distances of the middles of the cells from the group, m.
+    The function also computes the distances of the cells. Its loop has no branches, so
+    that the processor computes several cells at once.
+
+    ``piece`` has four indices: of the first cell of the piece in ``row``, of the cell
+    after its last, of the row in the arrays of the map, and of the first cell there.
+    ``place`` has the position of the row relative to the group along x, m, the position
+    of the group along y, m, and the index on the floor of the first cell of ``row``.
+    ``from_axle`` is the distance of the group from the axle, m.
     """
-    # Radius of the circle around a cell.
-    half = space.cell_m * math.sqrt(0.5)
-    (row, distances), rolled_m = of_row, space.rolled_m[0]
-    count = len(row)
-    free_until = space.free_until[i, first : first + count]
-    hits = space.hits[i, first : first + count]
-    evidence = space.evidence[i, first : first + count]
-    evident_until = space.evident_until[i, first : first + count]
+    begin, end, i, at = piece
+    (dx, sy, first), cell = place, space.cell_m
+    half, rolled_m = cell * math.sqrt(0.5), space.rolled_m[0]
+    free_until = space.free_until[i, at : at + end - begin]
+    ways, distances = row.way[begin:end], row.distance[begin:end]
+    for k in range(end - begin):
+        dy = (first + begin + k + 0.5) * cell - sy
+        distance = math.sqrt(dx * dx + dy * dy)
+        free = (ways[k] >= distance + half) & (distance >= 2.0 * half)
+        until = max(free_until[k], rolled_m + lasting(distance + from_axle, error))
+        free_until[k] = until if free else free_until[k]
+        distances[k] = distance
+
+
+@njit(cache=True, error_model="numpy")
+def _enter_doubts(
+    space: FreeSpace,
+    piece: Any,
+    row: RowView,
+    from_axle: float,
+    error: Any,
+    sigma: float,
+) -> None:  # pragma: no cover  (compiled)
+    """Changes the hits and the evidence of the cells of a row.
+
+    See ``_enter_free`` for the arguments. ``sigma`` is the standard deviation of the
+    noise, m.
+    """
+    begin, end, i, at = piece
+    count, stop = end - begin, at + end - begin
+    half, rolled_m = space.cell_m * math.sqrt(0.5), space.rolled_m[0]
+    free_until, hits = space.free_until[i, at:stop], space.hits[i, at:stop]
+    evidence, valid_until = space.evidence[i, at:stop], space.evident_until[i, at:stop]
+    ways, readings = row.way[begin:end], row.reading[begin:end]
+    echoes, distances = row.echo[begin:end], row.distance[begin:end]
+    doubts = row.doubt
+    # Few cells have anything to change. This loop without branches finds them, and a
+    # few more at the ends of echoes.
+    for k in range(count):
+        far, behind = distances[k] + half, abs(distances[k] - echoes[k])
+        doubt = max(readings[k] - far, 1.001 * half - behind)
+        doubts[k] = max(hits[k] if ways[k] >= far else doubt, evidence[k])
     for k in range(count):
         distance = distances[k]
-        if distance < 2.0 * half:
+        if doubts[k] <= 0.0 or distance < 2.0 * half:
             continue
-        far = distance + half
-        free, reading = row[k, 0] >= far, row[k, 1]
+        far, reading = distance + half, readings[k]
+        free = ways[k] >= far
         # A reading that is too short leaves cells without evidence as they are.
-        if free or reading > far or (evidence[k] > 0.0 and reading > -np.inf):
+        if not free and (reading > far or (evidence[k] > 0.0 and reading > -np.inf)):
+            if evidence[k] == 0.0:
+                valid_until[k] = np.inf
+            z = (reading - far) / sigma
+            evidence[k] = max(evidence[k] + z - 0.5, 0.0)
             until = rolled_m + lasting(distance + from_axle, error)
-            if not free:
-                if evidence[k] == 0.0:
-                    evident_until[k] = np.inf
-                z = (reading - far) / sigma
-                evidence[k] = max(evidence[k] + z - 0.5, 0.0)
-                evident_until[k] = until = min(evident_until[k], until)
-                free = evidence[k] >= _EVIDENCE
+            valid_until[k] = until = min(valid_until[k], until)
+            free = evidence[k] >= _EVIDENCE
             if free:
                 free_until[k] = max(free_until[k], until)
-                hits[k], evidence[k] = 0.0, 0.0
-        if not free and abs(distance - row[k, 2]) <= half:
+        if free:
+            hits[k], evidence[k] = 0.0, 0.0
+        elif abs(distance - echoes[k]) <= half:
             hits[k] += min(1.0, _FULL_HIT_M / distance)
 
 

@@ -259,6 +259,31 @@ def test_an_echo_is_counted_where_it_came_from_until_the_cell_is_seen_free():
     assert cell_is_free(space, i, 0, 1e9)
 
 
+@pytest.mark.parametrize("count", [12, 72])
+def test_echoes_are_counted_in_all_cells_at_their_distances(count):
+    space = make_free_space(160, CELL_M, count, 17)
+    draw = np.random.default_rng(count)
+    pose, echoes = draw.uniform(-0.5, 0.5, 3), draw.uniform(0.3, 3.5, count)
+    sensors = sensors_of("ring of 12" if count == 12 else "72 narrow beams")
+    readings = exact(np.column_stack([echoes - 0.02, echoes]))
+    for tick in range(4):
+        sectors = sensor_sectors(sensors, CONTROL_POINT_M)
+        see(space, tick, pose, sectors, readings, EXACT)
+    middles = (np.arange(-80, 80) + 0.5) * CELL_M
+    x, y = np.meshgrid(middles, middles, indexing="ij")
+    (axes, places, _), turn = sensors.beams, pose[2]
+    ahead, aside = np.add(places[0], (CONTROL_POINT_M, 0.0))
+    x -= pose[0] + math.cos(turn) * ahead - math.sin(turn) * aside
+    y -= pose[1] + math.sin(turn) * ahead + math.cos(turn) * aside
+    apart = np.arctan2(y, x)[..., None] - turn - np.array(axes)
+    sensor = np.argmax(np.cos(apart), axis=-1)  # whose axis is nearest to the cell
+    distance, half = np.hypot(x, y), CELL_M / math.sqrt(2.0)
+    hit = (np.abs(distance - echoes[sensor]) <= half) & (distance >= 2.0 * half)
+    assert hit.sum() > 200
+    expected = np.where(hit, np.minimum(1.0, 0.6 / distance), 0.0)
+    np.testing.assert_allclose(np.roll(space.hits, (80, 80), (0, 1)), expected)
+
+
 @pytest.mark.parametrize(("x", "y"), [(3.2, 0.0), (-2.4, 5.0), (0.3, -9.0), (40, 40)])
 def test_the_window_forgets_what_leaves_it_and_keeps_what_stays(x, y):
     space = make_free_space(64, CELL_M, 1, 2)
