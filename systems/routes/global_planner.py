@@ -28,6 +28,7 @@ from systems.routes.route import ROUTE_POINTS, ROUTE_SIZE, ROUTE_UNIT, fill_rout
 from systems.routes.seen_points import (
     SeenPoints,
     discs_to_avoid,
+    is_at_rest,
     make_seen_points,
     remember_objects,
 )
@@ -43,8 +44,9 @@ from systems.world.geometry import control_point
 #: clearance of the route near P, m.
 REPLANS, SINCE_S, FROM_M, CLEARANCE_M = range(4)
 #: The robot stalls if P advances along the route by less than ``_STALL_M``, m, within
-#: ``_STALLED_S``, s, or within ``_BLOCKED_S``, s, where a seen obstacle blocks the next
-#: ``_AHEAD_M``, m, of the route.
+#: ``_STALLED_S``, s, or within ``_BLOCKED_S``, s, where an object that is seen to be at
+#: rest blocks the next ``_AHEAD_M``, m, of the route. Moving objects, such as other
+#: robots, may leave during the longer time.
 _STALL_M, _STALLED_S, _BLOCKED_S, _AHEAD_M = 0.1, 6.0, 2.0, 1.0
 #: Distance from the goal within which the robot has arrived and does not stall, m.
 _ARRIVED_M = 0.05
@@ -130,7 +132,7 @@ def _clearance_at(
 def _is_blocked(
     numbers: PlannerNumbers, state: PlannerState, along: float
 ) -> bool:  # pragma: no cover  (compiled)
-    """Returns whether a seen point is too near to the route ahead of an arc length."""
+    """Returns whether something at rest is too near to the route ahead of a length."""
     route, seen = state.route, state.seen
     count, spacing = int(route[0]), route[1]
     first = min(max(int(along / spacing), 0), count - 1)
@@ -138,6 +140,8 @@ def _is_blocked(
     # New routes keep ``seen_m``, apart from less than a cell.
     near = numbers.seen_m - CELL_M
     for p in range(min(seen.added[0], len(seen.points))):
+        if not is_at_rest(seen, p):
+            continue
         x, y = seen.points[p, 0], seen.points[p, 1]
         for k in range(first, last + 1):
             dx, dy = route[2 + 2 * k] - x, route[3 + 2 * k] - y
@@ -160,8 +164,8 @@ def planner_step(
     if not numbers.replans:
         return
     x, y = control_point((pose[0], pose[1], pose[2]), numbers.control_point_m)
-    remember_objects(seen, numbers.grid, numbers.rectangles, objects, (x, y))
     time = tick * numbers.tick_s
+    remember_objects(seen, numbers.grid, numbers.rectangles, objects, (x, y), time)
     away = math.hypot(numbers.goal[0] - x, numbers.goal[1] - y)
     # P has advanced, or has arrived: restart the timer.
     if reached >= progress[FROM_M] + _STALL_M or away <= _ARRIVED_M:
@@ -203,8 +207,9 @@ class GlobalPlanner(Block):
     P. It includes all obstacles that the planner knew when it made the route.
 
     The robot stalls if P advances by less than 10 cm along the route in 6 s, or in 2 s
-    where a remembered point blocks the next meter of the route. Within 5 cm of the
-    goal, it does not count as stalled. If the robot stalls, the block plans a new route
+    where an object at rest blocks the next meter of the route. An object is at rest if
+    it was seen within 15 cm of a remembered point for 3 s. Within 5 cm of the goal, the
+    robot does not count as stalled. If the robot stalls, the block plans a new route
     from the position of P. This route also avoids the remembered points and robots at
     rest. If there is no such route, the block keeps the old route and tries again after
     the same time.

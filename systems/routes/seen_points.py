@@ -20,6 +20,7 @@ from systems.ranging.objects import (
 )
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import (
+    CELL_M,
     Discs,
     OccupancyGrid,
     cell_of,
@@ -31,6 +32,13 @@ _MOST_POINTS = 4_000
 #: Objects farther away than this are not remembered, m (our choice). The beams of a
 #: lidar are so far apart there that the nearest point of a wall may be off the wall.
 _REACH_M = 2.0
+#: An object is seen to be at rest if it stays within ``_SAME_M``, m, of a point for
+#: ``_REST_S``, s (our choice). It is then slower than about 0.05 m/s.
+_SAME_M, _REST_S = 0.15, 3.0
+#: If nothing was seen at a point for longer than this, the time starts again, s.
+_GAP_S = 1.0
+#: Indices of ``SeenPoints.times_s``.
+_FIRST, _LAST = range(2)
 
 
 class SeenPoints(NamedTuple):
@@ -38,24 +46,58 @@ class SeenPoints(NamedTuple):
 
     points: NDArray[np.float64]
     """(k, 2) in W, m."""
-    taken: NDArray[np.bool_]
-    """(n, m) cells of the grid that have a point."""
+    times_s: NDArray[np.float64]
+    """(k, 2) first and last time at which an object was at each point, s."""
+    rows: NDArray[np.int32]
+    """(n, m) row of the point in each cell of the grid, or -1."""
     added: NDArray[np.int64]
     """(1,) number of points remembered so far; a new point replaces the oldest."""
 
 
 def make_seen_points(grid: OccupancyGrid) -> SeenPoints:
     """Returns an empty memory for a grid."""
+    most = min(_MOST_POINTS, grid.blocked.size)
     return SeenPoints(
-        np.zeros((min(_MOST_POINTS, grid.blocked.size), 2)),
-        np.zeros(grid.blocked.shape, dtype=np.bool_),
+        np.zeros((most, 2)),
+        np.zeros((most, 2)),
+        np.full(grid.blocked.shape, -1, dtype=np.int32),
         np.zeros(1, dtype=np.int64),
     )
 
 
 @njit(cache=True)
+def is_at_rest(seen: SeenPoints, k: int) -> bool:  # pragma: no cover  (compiled)
+    """Checks whether an object was seen to be at rest at the point in row ``k``."""
+    return bool(seen.times_s[k, _LAST] - seen.times_s[k, _FIRST] >= _REST_S)
+
+
+@njit(cache=True)
+def _see_again(
+    seen: SeenPoints, cell: tuple[int, int], x: float, y: float, time_s: float
+) -> None:  # pragma: no cover  (compiled)
+    """Notes the time at all points near (x, y), which is in ``cell``."""
+    (i, j), (n, m), near = cell, seen.rows.shape, math.ceil(_SAME_M / CELL_M)
+    for a in range(max(i - near, 0), min(i + near + 1, n)):
+        for b in range(max(j - near, 0), min(j + near + 1, m)):
+            k = seen.rows[a, b]
+            if k < 0:
+                continue
+            if math.hypot(seen.points[k, 0] - x, seen.points[k, 1] - y) > _SAME_M:
+                continue
+            times = seen.times_s[k]
+            if time_s > times[_LAST] + _GAP_S and not is_at_rest(seen, k):
+                times[_FIRST] = time_s
+            times[_LAST] = time_s
+
+
+@njit(cache=True)
 def remember_objects(
-    seen: SeenPoints, grid: OccupancyGrid, rectangles: Any, objects: Any, p_WP: Any
+    seen: SeenPoints,
+    grid: OccupancyGrid,
+    rectangles: Any,
+    objects: Any,
+    p_WP: Any,
+    time_s: float,
 ) -> None:  # pragma: no cover  (compiled)
     """Remembers the nearest points of the objects that are not known to move.
 
@@ -69,6 +111,7 @@ def remember_objects(
             radius) in the world frame W, m and rad.
         objects: (64,) value of the port ``objects_W``, which lists the seen objects.
         p_WP: (x, y) of the control point P in W, m.
+        time_s: Present time, s.
     """
     for slot in range(OBJECT_SLOTS):
         at = slot * OBJECT_SIZE
@@ -80,7 +123,10 @@ def remember_objects(
             continue
         x, y = p_WP[0] + objects[at + X], p_WP[1] + objects[at + Y]
         i, j = cell_of(grid, x, y)
-        if i < 0 or seen.taken[i, j]:
+        if i < 0:
+            continue
+        _see_again(seen, (i, j), x, y, time_s)
+        if seen.rows[i, j] >= 0:
             continue
         if is_on_map(x, y, rectangles):
             continue
@@ -89,9 +135,10 @@ def remember_objects(
         k = seen.added[0] % most
         if seen.added[0] >= most:
             old_i, old_j = cell_of(grid, seen.points[k, 0], seen.points[k, 1])
-            seen.taken[old_i, old_j] = False
+            seen.rows[old_i, old_j] = -1
         seen.points[k, 0], seen.points[k, 1] = x, y
-        seen.taken[i, j] = True
+        seen.times_s[k] = time_s
+        seen.rows[i, j] = k
         seen.added[0] += 1
 
 

@@ -220,11 +220,11 @@ def test_it_comes_past_an_unknown_wall_and_compiled_the_same(compiled_tick):
     np.testing.assert_array_equal(again, drake[:400])
 
 
-def ticks_of_replans(planner, tick, objects, pose, count, progress=(0.5, 0.3)):
+def ticks_of_replans(planner, tick, objects, pose, ways):
     """When the route changed, of a robot that stands, and the state at the end."""
     step = planner.step_for(facts())
     state, changed = step.state, []
-    for k in range(count):
+    for k, progress in enumerate(ways):
         before = state.route.copy()
         tick(step.step, k, state, (objects, pose, progress), (), step.numbers)
         if (before != state.route).any():
@@ -235,14 +235,20 @@ def ticks_of_replans(planner, tick, objects, pose, count, progress=(0.5, 0.3)):
 STANDS = (1.0 - EPSILON, 0.0, 0.0)
 
 
-@pytest.mark.parametrize(("aside", "at"), [(0.0, 80), (0.9, 240)])
-def test_it_plans_anew_after_2_s_where_it_is_blocked_else_after_6_s(
-    aside, at, compiled_tick
+@pytest.mark.parametrize(
+    ("aside", "made", "at"), [(0.0, 0, 120), (0.0, 60, 140), (0.9, 0, 240)]
+)
+def test_it_plans_anew_after_2_s_where_something_at_rest_blocks_it_else_after_6_s(
+    aside, made, at, compiled_tick
 ):
-    """P is 0.3 m along from the first tick on: that is way made, at 0 s."""
+    """What is seen at 0 s for the first time is known to be at rest at 3 s, tick 120.
+
+    P makes way until tick ``made``: it is 0.3 m along from then on.
+    """
     post = [(1.4, aside, 0.0, 0.1, 0.1, 0.0)]
     objects = objects_at(1.0, 0.0, post)
-    changed, state = ticks_of_replans(make(), compiled_tick, objects, STANDS, 300)
+    ways = [(0.5, 0.3 if k >= made else 0.0) for k in range(300)]
+    changed, state = ticks_of_replans(make(), compiled_tick, objects, STANDS, ways)
     # From then on the route is known: planned again from the same place it is the same.
     assert changed == [at]
     route = state.route[2:].reshape(-1, 2)[: int(state.route[0])]
@@ -255,7 +261,9 @@ def test_it_plans_anew_after_2_s_where_it_is_blocked_else_after_6_s(
 
 def test_who_is_at_the_goal_does_not_stall(compiled_tick):
     pose = (3.96 - EPSILON, 0.0, 0.0)
-    changed, _ = ticks_of_replans(make(), compiled_tick, np.zeros(64), pose, 600)
+    changed, _ = ticks_of_replans(
+        make(), compiled_tick, np.zeros(64), pose, [(0.5, 0.3)] * 600
+    )
     assert not changed
 
 

@@ -9,6 +9,7 @@ from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import make_occupancy_grid
 from systems.routes.seen_points import (
     discs_to_avoid,
+    is_at_rest,
     make_seen_points,
     remember_objects,
 )
@@ -28,7 +29,7 @@ def slots(*objects):
 def remembered(*objects, rectangles=NOTHING):
     grid = make_occupancy_grid(ARENA)
     seen = make_seen_points(grid)
-    remember_objects(seen, grid, rectangles, slots(*objects), P)
+    remember_objects(seen, grid, rectangles, slots(*objects), P, 0.0)
     return seen.points[: seen.added[0]]
 
 
@@ -71,13 +72,40 @@ def test_one_point_a_cell_and_the_oldest_are_forgotten():
         x, y = 0.05 * (k % 120) + 0.02, 0.05 * (k // 120) + 0.01
         for shift in (0.0, 0.02):
             port = slots((1, shift, 0, 0, 0, 0, 0, 0))
-            remember_objects(seen, grid, NOTHING, port, (x, y))
+            remember_objects(seen, grid, NOTHING, port, (x, y), 0.0)
     assert seen.added[0] == 5000
-    assert seen.taken.sum() == 4000
+    assert (seen.rows >= 0).sum() == 4000
     # The first thousand made room for the last.
     assert seen.points[0] == pytest.approx([0.05 * (4000 % 120) + 0.02, 0.05 * 33.2])
-    assert not seen.taken[0, 0]
-    assert seen.taken[120 - 1, 40]
+    assert seen.rows[0, 0] == -1
+    assert seen.rows[120 - 1, 40] == 4919 - 4000
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "unseen", "rests"),
+    [
+        (0.0, (), True),
+        (0.04, (), True),
+        (0.06, (), False),
+        # 0.9 s without an echo are bridged; 1.1 s are not, and only 1.9 s remain.
+        (0.0, (1.0, 1.9), True),
+        (0.0, (1.0, 2.1), False),
+    ],
+)
+def test_what_stays_near_a_place_for_3_s_is_at_rest(speed_m_s, unseen, rests):
+    """Within 0.15 m, so at most 0.05 m/s: the first point of something that moves."""
+    grid = make_occupancy_grid(ARENA)
+    seen = make_seen_points(grid)
+    for time in np.arange(0.0, 3.01, 0.1):
+        assert not is_at_rest(seen, 0)
+        if unseen and unseen[0] < time < unseen[1] + 0.05:
+            continue
+        port = slots((1, 0.6 + speed_m_s * time, 0.0, 0, 0, 0, 0.0, 0))
+        remember_objects(seen, grid, NOTHING, port, P, time)
+    assert is_at_rest(seen, 0) == rests
+    # Once at rest, it stays so.
+    remember_objects(seen, grid, NOTHING, slots((1, 0.6, 0, 0, 0, 0, 0, 0)), P, 60.0)
+    assert is_at_rest(seen, 0) == rests
 
 
 def test_routes_keep_off_robots_that_rest_for_now():
@@ -86,7 +114,7 @@ def test_routes_keep_off_robots_that_rest_for_now():
     box = (1, 0.6, 0.0, 0, 0, 0, 0, 0)
     rests, moves = (1, 0, -0.8, 0, 0, 1, 0.15, 1), (1, 0.9, 0, 0, 0.1, 1, 0.15, 1)
     port = slots(box, rests, moves)
-    remember_objects(seen, grid, NOTHING, port, P)
+    remember_objects(seen, grid, NOTHING, port, P, 0.0)
     expected = [[0.5, -0.5 - 0.95, 0.15], [1.1, -0.5, 0.0]]
     discs = discs_to_avoid(seen, port, P)
     assert discs.rows == pytest.approx(np.array(expected))
