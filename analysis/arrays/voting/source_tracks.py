@@ -45,10 +45,6 @@ _FARTHEST = math.radians(45.0)
 # ``TrackParameters.least_share``. Most such tracks are reflections.
 _KEPT = 0.8
 
-# Two tracks share a detection only if its distance from the nearer one is at least this
-# part of the distance between them. Otherwise it is a detection of that track.
-_BETWEEN = 0.25
-
 # While another source sounds, a new track must be so many times as old before it is
 # reported. Two sources that sound together also cause votes between them, but these
 # rarely last.
@@ -183,8 +179,7 @@ def _hidden(
                 continue
             apart = apart_rad(track, other)
             off = apart_rad(detections[k], track)
-            between = apart_rad(detections[k], other) > _BETWEEN * apart
-            if apart < resolution and off < resolution and between:
+            if apart < resolution and off < resolution:
                 hidden[i] = j
                 break
     return hidden

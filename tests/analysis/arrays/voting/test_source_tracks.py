@@ -173,13 +173,3 @@ def test_a_faint_detection_moves_a_track_less():
         return math.degrees(told[-1][0].bearing)
 
     assert 0.0 < bearing(0.2) < 0.5 * bearing(1.0)
-
-
-def test_two_tracks_do_not_keep_a_detection_of_one_of_them_from_it():
-    """The second track passes the source at 12 deg/s, and is not heard again."""
-    steps = [[(30.0 - 1.2 * k, 0.5), (0.0, 0.5)] for k in range(14)]
-    steps += [[(0.0, 0.5)]] * 20
-    for tracks in follow_detections(steps)[14:]:
-        nearest = min(tracks, key=lambda track: abs(track.bearing))
-        assert abs(math.degrees(nearest.bearing)) < 2.0
-        assert math.degrees(nearest.bearing_std) < 4.0
