@@ -20,6 +20,8 @@ from systems.planning.following import CRUISE_SPEED_M_S
 from systems.planning.guarded_drive import drive_guarded
 from systems.planning.looks import HazardSensors
 from systems.ranging.parameters import UltrasonicParameters
+from systems.safety.braking import SLOW_TURN_RAD_S
+from systems.safety.outline import Outline
 from systems.safety.parameters import GuardParameters
 from systems.safety.views import range_errors
 
@@ -27,6 +29,9 @@ from systems.safety.views import range_errors
 _CLEARANCE_M = 0.02
 #: Share of the top speed at which a fast robot drives. The rest is left for turns.
 _CRUISE_SHARE = 0.86
+#: Share of the largest creeping speed at which a long body passes. The rest is left for
+#: turns.
+_CREEP_SHARE = 0.8
 
 
 def guarded_step(
@@ -36,7 +41,7 @@ def guarded_step(
     drive_guarded(tick, state, inputs, numbers)
     memory, (twist, plan, gives_up) = state.memory, outputs
     twist[0], twist[1] = memory.speed[0], memory.turn[0]
-    plan[0], plan[1] = memory.mode[0], memory.carrot[0]
+    plan[0], plan[1] = memory.mode[0] + 10 * state.passage.state[0], memory.carrot[0]
     plan[2], plan[3] = memory.carrot[1], memory.way_left_m[0]
     gives_up[0] = 1.0 if memory.mode[0] == GIVING_UP else 0.0
 
@@ -133,8 +138,11 @@ class GuardedController(Block):
         margin = guard.place_error_m + _CLEARANCE_M
         # In a passage, a body that is longer than wide is narrower than its disc. For a
         # wide body, the difference is too small to risk a place where it cannot turn.
-        disc = body_radius(robot)
+        disc, outline = body_radius(robot), Outline.of(robot)
         narrow = 0.5 * robot.width_m if robot.length_m > robot.width_m else disc
+        creep = _CREEP_SHARE * SLOW_TURN_RAD_S * disc if outline.is_long else 0.0
+        if outline.is_long:
+            narrow -= guard.cell_m
         numbers = DriveNumbers(
             attraction.follow_distance_m,
             robot.control_point_m,
@@ -143,6 +151,7 @@ class GuardedController(Block):
             (narrow + margin, disc + margin),
             cruise_speed(robot),
             tick_s,
+            creep,
         )
         state = make_drive_state(guard.cells_for(disc), sensors.count)
         self.declare(

@@ -38,7 +38,8 @@ from systems.planning.drive_state import (
 from systems.planning.evasion import choose_motion
 from systems.planning.hazards import pick_hazards, track_hazards
 from systems.planning.look_around import begin_look, look_around
-from systems.planning.turning import TURN_GAIN, slowed_by, turn_rate, wrapped
+from systems.planning.passage import OPEN, PASSING
+from systems.planning.turning import TURN_FIRST_RAD, TURN_GAIN, slowed_by, turn_rate, wrapped
 from systems.planning.way import MARK_S, NEAR, mark_blocked
 from systems.safety.braking import TURNED
 
@@ -141,7 +142,8 @@ def drive_guarded(
         return
     if m.mode[0] == WAITING or m.mode[0] == GIVING_UP:
         m.mode[0] = DRIVING
-    if m.mode[0] == DRIVING:
+    passing = state.passage.state[0] == PASSING
+    if m.mode[0] == DRIVING and not passing:
         begin_look(time, pose, pose[2] + error, m, space, numbers)
     if m.mode[0] == LOOKING:
         look_around(time, pose, report, state)
@@ -150,7 +152,9 @@ def drive_guarded(
     if m.mode[0] == DRIVING and time - m.stays_s[0] > _GIVE_UP_S:
         ahead, at = pose[2] + error, numbers.widths[1] + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
-        mark_blocked(state.way, place, time + MARK_S)
+        if not passing:
+            mark_blocked(state.way, place, time + MARK_S)
+        state.passage.state[0] = OPEN
         begin_backing(m, time)
     if m.mode[0] == BACKING:
         back_off(m, time, pose, error, report)
@@ -208,6 +212,13 @@ def _drive(  # type: ignore[no-untyped-def]
     error is large, the robot turns without driving.
     """
     m = state.memory
+    if state.passage.state[0] == PASSING:
+        m.speed[0] = slowed_by(error, wanted)
+        m.turn[0] = turn_rate(error)
+        if abs(error) < TURN_FIRST_RAD:
+            # This twist moves the front in the wanted direction.
+            m.turn[0] = wanted * math.sin(error) / numbers.half_size[0]
+        return
     if there and numbers.follow_distance_m < numbers.control_point_m:
         # This twist gives P the wanted velocity.
         m.speed[0] = wanted * math.cos(error)

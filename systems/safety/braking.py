@@ -9,7 +9,7 @@ import numpy as np
 
 from systems.framework.compiling import njit
 from systems.safety.danger import Danger, nearest_view
-from systems.safety.outline import enters, frame_at, gaps, least_between
+from systems.safety.outline import LONG, enters, frame_at, gaps, least_between
 from systems.safety.predicted_motion import BrakingNumbers, braked, roll_on
 from systems.safety.views import IN_PLACE_M, REST_M
 
@@ -83,6 +83,9 @@ def can_be_braked(
         return False
     turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
     slow = in_place and turn <= SLOW_TURN_RAD_S
+    # A long body that creeps counts as at rest, too.
+    if numbers.outline.half_length_m >= LONG * numbers.outline.half_width_m:
+        slow = slow or (_creeps(commanded, numbers) and _creeps(speeds, numbers))
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
     begin, disc = pose, outline.radius_m + numbers.keep_m
     # Number of distances from ``gaps`` that separate a cell from the body.
@@ -136,6 +139,19 @@ def can_be_braked(
             return True
         if parts % numbers.parts == 0:
             commanded = braked(commanded, numbers)
+
+
+@njit(cache=True)
+def _creeps(
+    wheels: Any, numbers: BrakingNumbers
+) -> bool:  # pragma: no cover  (compiled)
+    """Checks whether every point of the body is slower than its corners in a slow turn.
+
+    ``wheels`` are the speeds of the left and right wheel, rad/s.
+    """
+    radius, lever = numbers.wheel_radius_m, numbers.outline.radius_m
+    turn = abs(wheels[1] - wheels[0]) * radius / numbers.wheel_separation_m
+    return _ahead(wheels, radius) + turn * lever <= SLOW_TURN_RAD_S * lever
 
 
 @njit(cache=True)

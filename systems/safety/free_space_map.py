@@ -16,6 +16,8 @@ from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
+    MOST_SLACK,
+    PARTS,
     FreeSpace,
     clear_disc,
     clear_outline,
@@ -30,6 +32,7 @@ from systems.safety.views import (
     RANGE_MARGIN_M,
     PlaceError,
     Sectors,
+    checked_reach,
     lasting,
     range_errors,
     sensor_sectors,
@@ -87,7 +90,10 @@ def map_step(
     ranges, echo, ages, pose, commanded = inputs
     space, was_at, error = state.free_space, state.was_at, numbers.error
     time = tick * numbers.tick_s
+    long = len(space.fine.hits) > 0
     move_window(space, pose[0], pose[1])
+    if long:
+        move_window(space.fine, pose[0], pose[1])
     # The first tick clears the start bubble. Each later tick adds the distance rolled
     # since the previous tick.
     if math.isnan(was_at[0]):
@@ -110,6 +116,9 @@ def map_step(
     radius = numbers.outline.radius_m
     until = space.rolled_m[0] + lasting(radius, error)
     clear_outline(space, pose, numbers.outline, until)
+    if long:
+        space.fine.rolled_m[0] = space.rolled_m[0]
+        clear_outline(space.fine, pose, numbers.outline, until)
     if disc_is_free(space, pose[0], pose[1], radius + numbers.margin_m):
         clear_disc(space, pose[0], pose[1], radius, until)
     # Readings of the sensors that have fired in this tick.
@@ -136,6 +145,8 @@ def map_step(
     # Each reading of a sensor updates different rows.
     turn_of_rows = tick // numbers.round_ticks
     see(space, turn_of_rows, pose, numbers.sectors, readings, error)
+    if long:
+        see(space.fine, turn_of_rows, pose, numbers.sectors, readings, error)
 
 
 @register_jitable
@@ -247,7 +258,14 @@ class FreeSpaceMap(Block):
             sensors.round_ticks(tick_s),
         )
         cells = parameters.cells_for(body_radius(robot))
-        space = make_free_space(cells, parameters.cell_m, sensors.count, points)
+        fine_cells = 0
+        if numbers.outline.is_long:
+            fine_m = parameters.cell_m / PARTS
+            reach = checked_reach(parameters, robot, plant, tick_s)
+            fine_cells = 2 * math.ceil(reach / fine_m + MOST_SLACK + 2)
+        space = make_free_space(
+            cells, parameters.cell_m, sensors.count, points, fine_cells
+        )
         self.declare(
             Step(map_step, numbers, MapState(space, np.full(3, np.nan))),
             tick_s=tick_s,

@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from systems.framework.compiling import njit
-from systems.safety.free_space import FreeSpace, cells_within
+from systems.safety.free_space import FineSpace, FreeSpace, cells_within
 from systems.safety.group_view import group_view, look_along_row, seen_in_sectors
 from systems.safety.views import Sectors, lasting
 
@@ -29,7 +29,12 @@ _FULL_HIT_M = 0.6
 
 @njit(cache=True, error_model="numpy")
 def see(
-    space: FreeSpace, turn: int, pose: Any, sectors: Sectors, readings: Any, error: Any
+    space: FreeSpace | FineSpace,
+    turn: int,
+    pose: Any,
+    sectors: Sectors,
+    readings: Any,
+    error: Any,
 ) -> None:  # pragma: no cover  (compiled)
     """Enters the newest readings of the sensors into the map of free space.
 
@@ -110,7 +115,7 @@ def see(
 
 @njit(cache=True, error_model="numpy")
 def _enter_row(
-    space: FreeSpace,
+    space: FreeSpace | FineSpace,
     i: int,
     first: int,
     of_row: Any,

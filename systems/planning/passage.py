@@ -1,0 +1,323 @@
+"""Passages that are narrower than the disc around a long body.
+
+A long body can pass them only in line with them. For a passage on the route, this
+module finds its axis, and a place at which the robot begins to line up with it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+
+from systems.framework.compiling import njit
+from systems.planning.turning import wrapped
+from systems.planning.way import OCCUPIED_HITS, Way
+from systems.safety.free_space import FreeSpace, cells_within
+
+#: States of ``Passage``: there is no passage, the robot drives to its approach, or it
+#: drives along its axis.
+OPEN, APPROACHING, PASSING = range(3)
+
+#: A passage begins within this length of the route, m.
+_AHEAD_M = 6.0
+#: Longest part of a passage that counts at once, as a multiple of the disc's radius.
+_LONGEST = 4.0
+#: Least number of hits of an occupied fine cell.
+_FINE_HITS = 1.5
+# ``_LINED_UP_RAD``: largest heading error at the begin of the passage, rad.
+# ``_LINED_UP``: largest distance from the axis there, as a multiple of the half width.
+_LINED_UP_RAD, _LINED_UP = 0.04, 0.03
+#: Distance from the approach to the passage, as a multiple of half of the length.
+_APPROACH = 3.0
+#: Directions from which the front may come to the approach, from the axis, rad.
+_SLANTS = (0.0, 0.35, -0.35, 0.7, -0.7)
+#: Steps of the search for the axis: coarse and fine, rad.
+_STEPS = 0.05, 0.005
+# ``_GAIN``: share by which a plan moves the axis toward that of the map.
+# ``_MOST_SHIFT_M``: an axis that is farther beside is that of another passage, m.
+_GAIN, _MOST_SHIFT_M = 0.3, 0.1
+#: Distance within which the front returns to the axis, as a multiple of half of the
+#: length.
+_RETURN = 0.5
+
+
+class Passage(NamedTuple):
+    """The passage for which the robot lines up. Arrays have the shape (1,)."""
+
+    state: NDArray[np.float64]
+    """``OPEN``, ``APPROACHING`` or ``PASSING``."""
+    middle: NDArray[np.float64]
+    """(2,) point (x, y) on the axis, in the middle of the passage, m."""
+    axis: NDArray[np.float64]
+    """Direction of the axis, rad."""
+    half_m: NDArray[np.float64]
+    """Half of the length of the passage, m."""
+    width_m: NDArray[np.float64]
+    """Width of the passage, m."""
+    approach: NDArray[np.float64]
+    """(2,) point (x, y) from which the axle starts along the axis, m."""
+
+
+def make_passage() -> Passage:
+    """Makes the memory without a passage."""
+    return Passage(*(np.zeros(n) for n in (1, 2, 1, 1, 1, 2)))
+
+
+@njit(cache=True)
+def occupied_points(
+    space: FreeSpace, place: Any, reach: float, clear: Any
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """Lists the middles of occupied cells in a square, fine cells where there are some.
+
+    Args:
+        space: Map of free space with fine cells.
+        place: Middle (x, y) of the square, m.
+        reach: Half of its side, m.
+        clear: (n, 3) positions (x, y) and radii, m, whose cells do not count.
+
+    Returns:
+        (n, 2) positions, m.
+    """
+    (x, y), fine = place, space.fine
+    size, side = len(fine.hits), fine.cell_m
+    low_x, low_y = fine.first[0] * side, fine.first[1] * side
+    found, count = np.empty((256, 2)), 0
+    for level in range(2):
+        if level == 0:
+            hits, cell, least = space.hits, space.cell_m, OCCUPIED_HITS
+            box = cells_within(space, x - reach, y - reach, x + reach, y + reach)
+        else:
+            hits, cell, least = fine.hits, side, _FINE_HITS
+            box = cells_within(fine, x - reach, y - reach, x + reach, y + reach)
+        cells = len(hits)
+        for i in range(box[0], box[2] + 1):
+            for j in range(box[1], box[3] + 1):
+                if hits[i % cells, j % cells] < least:
+                    continue
+                px, py = (i + 0.5) * cell, (j + 0.5) * cell
+                inside = 0.0 <= px - low_x < size * side
+                inside = inside and 0.0 <= py - low_y < size * side
+                if level == 0 and inside:
+                    continue
+                near = False
+                for k in range(len(clear)):
+                    off = math.hypot(px - clear[k, 0], py - clear[k, 1])
+                    near = near or off < clear[k, 2]
+                if near:
+                    continue
+                if count == len(found):
+                    more = np.empty((2 * count, 2))
+                    more[:count] = found
+                    found = more
+                found[count, 0], found[count, 1] = px, py
+                count += 1
+    return found[:count]
+
+
+@njit(cache=True)
+def _sides(points: Any, x: float, y: float) -> Any:  # pragma: no cover  (compiled)
+    """Returns the distances of the nearest point and of the nearest one opposite, m."""
+    first, at = np.inf, -1
+    for k in range(len(points)):
+        distance = math.hypot(points[k, 0] - x, points[k, 1] - y)
+        if distance < first:
+            first, at = distance, k
+    second = np.inf
+    if at >= 0:
+        ux, uy = points[at, 0] - x, points[at, 1] - y
+        for k in range(len(points)):
+            dx, dy = points[k, 0] - x, points[k, 1] - y
+            distance = math.hypot(dx, dy)
+            if distance < second and ux * dx + uy * dy < -0.5 * first * distance:
+                second = distance
+    return first, second
+
+
+@njit(cache=True)
+def _narrow_part(
+    way: Way, points: Any, radius: float
+) -> tuple[int, int]:  # pragma: no cover  (compiled)
+    """Finds the first part of the route with points on both sides within the disc.
+
+    Returns:
+        Numbers of its first and last point, or -1 and -1.
+    """
+    begin, end, length = -1, -1, 0.0
+    for k in range(1, way.points[0]):
+        x, y = way.path[k]
+        step = math.hypot(x - way.path[k - 1, 0], y - way.path[k - 1, 1])
+        length += step
+        first, second = _sides(points, x, y)
+        if first + second < 2.0 * radius:
+            if begin < 0:
+                if length > _AHEAD_M:
+                    break
+                begin, length = k, 0.0
+            end = k
+            if length > _LONGEST * radius:
+                break
+        elif begin >= 0 and length > 0.3:
+            break
+        elif begin < 0 and length > _AHEAD_M:
+            break
+    return begin, end
+
+
+@njit(cache=True)
+def _gap(
+    points: Any, middle: Any, angle: float, half: float
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Returns how far the nearest points are to the right and left of a line, m."""
+    c, s = math.cos(angle), math.sin(angle)
+    right, left = 3.0, 3.0
+    for k in range(len(points)):
+        dx, dy = points[k, 0] - middle[0], points[k, 1] - middle[1]
+        if abs(c * dx + s * dy) <= half:
+            v = c * dy - s * dx
+            if v > 0.0:
+                left = min(left, v)
+            else:
+                right = min(right, -v)
+    return right, left
+
+
+@njit(cache=True)
+def fit_axis(
+    p: Passage, points: Any, spread: float, step: float
+) -> None:  # pragma: no cover  (compiled)
+    """Turns and shifts the axis so that the passage along it is as wide as possible.
+
+    The directions differ from the present one by at most ``spread``, rad, in steps of
+    ``step``. Of directions with the same width, the mean counts.
+    """
+    begin, widest = p.axis[0], -1.0
+    total, count = 0.0, 0
+    steps = math.ceil(spread / step)
+    for n in range(-steps, steps + 1):
+        right, left = _gap(points, p.middle, begin + n * step, p.half_m[0])
+        width = right + left
+        if width > widest + 0.002:
+            widest, total, count = width, 0.0, 0
+        if width > widest - 0.002:
+            total, count = total + n * step, count + 1
+    p.axis[0] = angle = begin + total / count
+    right, left = _gap(points, p.middle, angle, p.half_m[0])
+    shift = 0.5 * (left - right)
+    p.middle[0] -= shift * math.sin(angle)
+    p.middle[1] += shift * math.cos(angle)
+    p.width_m[0] = right + left
+
+
+@njit(cache=True)
+def refine_axis(
+    p: Passage, points: Any, half_width: float
+) -> None:  # pragma: no cover  (compiled)
+    """Moves the axis toward that of the present map by ``_GAIN``.
+
+    A map that gives another passage does not change the axis.
+    """
+    x, y, axis, width = p.middle[0], p.middle[1], p.axis[0], p.width_m[0]
+    fit_axis(p, points, 0.05, _STEPS[1])
+    moved = math.hypot(p.middle[0] - x, p.middle[1] - y)
+    share = _GAIN
+    if moved > _MOST_SHIFT_M or p.width_m[0] < 1.9 * half_width:
+        share = 0.0
+    p.middle[0], p.middle[1] = x + share * (p.middle[0] - x), y + share * (p.middle[1] - y)
+    p.axis[0] = axis + share * (p.axis[0] - axis)
+    p.width_m[0] = width + share * (p.width_m[0] - width)
+
+
+@njit(cache=True)
+def find_passage(
+    p: Passage, way: Way, points: Any, radius: float, half_size: Any
+) -> None:  # pragma: no cover  (compiled)
+    """Finds the first passage of the route, and where to line up for it.
+
+    Args:
+        p: Passage. The function changes the arrays in place.
+        way: Route from the robot to the goal.
+        points: (n, 2) positions of occupied cells, m.
+        radius: Radius of the disc around the body, with margin, m.
+        half_size: Half of the body's length and width, m.
+    """
+    p.state[0] = OPEN
+    begin, end = _narrow_part(way, points, radius)
+    if begin < 0:
+        return
+    a, b, m = way.path[begin], way.path[end], way.path[(begin + end) // 2]
+    if end - begin < 3:
+        a, b = way.path[max(begin - 5, 0)], way.path[min(end + 5, way.points[0] - 1)]
+    p.middle[0], p.middle[1] = m[0], m[1]
+    length = math.hypot(b[0] - a[0], b[1] - a[1])
+    p.axis[0] = math.atan2(b[1] - a[1], b[0] - a[0])
+    p.half_m[0] = max(0.5 * length, 0.5 * radius)
+    for _ in range(2):
+        fit_axis(p, points, 0.8, _STEPS[0])
+    fit_axis(p, points, 0.06, _STEPS[1])
+    if p.width_m[0] < 2.0 * half_size[1] or p.width_m[0] >= 2.0 * radius:
+        return
+    p.state[0] = APPROACHING
+    _place_approach(p, points, radius, half_size[0])
+
+
+@njit(cache=True)
+def _place_approach(
+    p: Passage, points: Any, radius: float, half_length: float
+) -> None:  # pragma: no cover  (compiled)
+    """Places the axle so that its front is on the axis and the disc is clear."""
+    best = -np.inf
+    back = p.half_m[0] + _APPROACH * half_length
+    c, s = math.cos(p.axis[0]), math.sin(p.axis[0])
+    fx, fy = p.middle[0] - back * c, p.middle[1] - back * s
+    for slant in _SLANTS:
+        angle = p.axis[0] + slant
+        x, y = fx - half_length * math.cos(angle), fy - half_length * math.sin(angle)
+        clear = min(_sides(points, x, y)[0], radius + 0.1)
+        if clear > best + 0.01:
+            best, p.approach[0], p.approach[1] = clear, x, y
+
+
+@register_jitable
+def front_error(p: Passage, pose: Any, half_length: float) -> tuple[float, float]:
+    """Computes where the middle of the front is, along and beside the axis, m."""
+    c, s = math.cos(p.axis[0]), math.sin(p.axis[0])
+    dx = pose[0] + half_length * math.cos(pose[2]) - p.middle[0]
+    dy = pose[1] + half_length * math.sin(pose[2]) - p.middle[1]
+    return c * dx + s * dy, c * dy - s * dx
+
+
+@register_jitable
+def along_axis(p: Passage, pose: Any, half_length: float) -> float:
+    """Computes the direction in which the front has to move, from the heading, rad."""
+    _, aside = front_error(p, pose, half_length)
+    wanted = p.axis[0] - math.atan(aside / (_RETURN * half_length))
+    return wrapped(wanted - pose[2])
+
+
+@njit(cache=True)
+def lines_up(
+    p: Passage, pose: Any, half_size: Any
+) -> bool:  # pragma: no cover  (compiled)
+    """Predicts whether the robot is in line when its front enters the passage."""
+    half_length, step = half_size[0], 0.02
+    x, y, theta = pose[0], pose[1], pose[2]
+    along, aside = front_error(p, pose, half_length)
+    if along < -p.half_m[0] - (_APPROACH + 1.5) * half_length:
+        return False
+    for _ in range(1000):
+        now = x, y, theta
+        along, aside = front_error(p, now, half_length)
+        error = along_axis(p, now, half_length)
+        if along >= -p.half_m[0]:
+            off = abs(wrapped(p.axis[0] - theta))
+            return off < _LINED_UP_RAD and abs(aside) < _LINED_UP * half_size[1]
+        if abs(error) > 1.2:
+            return False
+        way = step * math.cos(error)
+        x, y = x + way * math.cos(theta), y + way * math.sin(theta)
+        theta += step * math.sin(error) / half_length
+    return False

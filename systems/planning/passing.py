@@ -1,0 +1,64 @@
+"""Decision when a long body lines up with a passage, and when it has passed it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from numba.extending import register_jitable
+
+from systems.planning.drive_state import DriveNumbers, DriveState
+from systems.planning.passage import (
+    APPROACHING,
+    OPEN,
+    PASSING,
+    find_passage,
+    front_error,
+    lines_up,
+    occupied_points,
+    refine_axis,
+)
+from systems.planning.way import find_way
+from systems.safety.free_space import FreeSpace
+
+#: Distance from the robot within which occupied cells count, m.
+_REACH_M = 8.0
+#: An axle within this distance of its place has reached it, m.
+_THERE_M = 0.25
+
+
+@register_jitable
+def plan_passage(
+    time: float,
+    pose: Any,
+    state: DriveState,
+    space: FreeSpace,
+    clear: Any,
+    numbers: DriveNumbers,
+) -> None:
+    """Finds the next passage of the route, and plans the route to its approach.
+
+    The arguments are those of ``find_heading``, and the positions and radii that do not
+    block routes.
+    """
+    p, half_size, radius = state.passage, numbers.half_size, numbers.widths[1]
+    here = pose[0], pose[1]
+    points = occupied_points(space, here, _REACH_M, clear)
+    if p.state[0] == PASSING:
+        along, _ = front_error(p, pose, half_size[0])
+        if along > p.half_m[0] + 2.0 * half_size[0]:
+            p.state[0] = OPEN
+        else:
+            if along < -p.half_m[0] - 0.5 * half_size[0]:
+                refine_axis(p, points, half_size[1])
+            state.memory.passable_s[0] = time
+            return
+    find_passage(p, state.way, points, radius, half_size)
+    if p.state[0] == OPEN:
+        return
+    left = math.hypot(p.approach[0] - pose[0], p.approach[1] - pose[1])
+    if left < _THERE_M or lines_up(p, pose, half_size):
+        p.state[0] = PASSING
+        return
+    place = p.approach[0], p.approach[1]
+    find_way(state.way, space, here, place, time, numbers.widths, clear)
