@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.planning.turning import wrapped
-from systems.planning.way import OCCUPIED_HITS, Way
+from systems.planning.way import Way
 from systems.safety.free_space import FreeSpace, cells_within
 
 #: States of ``Passage``: there is no passage, the robot drives to its approach, or it
@@ -26,20 +26,21 @@ OPEN, APPROACHING, PASSING = range(3)
 _AHEAD_M = 6.0
 #: Longest part of a passage that counts at once, as a multiple of the disc's radius.
 _LONGEST = 4.0
-#: Least number of hits of an occupied fine cell.
-_FINE_HITS = 1.5
+#: Least number of hits of an occupied cell, and of an occupied fine cell.
+_HITS, _FINE_HITS = 3.0, 1.5
 # ``_LINED_UP_RAD``: largest heading error at the begin of the passage, rad.
 # ``_LINED_UP``: largest distance from the axis there, as a multiple of the half width.
 _LINED_UP_RAD, _LINED_UP = 0.04, 0.03
 #: Distance from the approach to the passage, as a multiple of half of the length.
 _APPROACH = 3.0
 #: Directions from which the front may come to the approach, from the axis, rad.
-_SLANTS = (0.0, 0.35, -0.35, 0.7, -0.7)
+_SLANTS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.0, -1.0)
 #: Steps of the search for the axis: coarse and fine, rad.
 _STEPS = 0.05, 0.005
-# ``_GAIN``: share by which a plan moves the axis toward that of the map.
-# ``_MOST_SHIFT_M``: an axis that is farther beside is that of another passage, m.
-_GAIN, _MOST_SHIFT_M = 0.3, 0.1
+#: An axis that is farther beside is that of another passage, m.
+_MOST_SHIFT_M = 0.15
+#: Least measured width of a passage, as a multiple of half of the body's width.
+_NARROWEST = 1.6
 #: Distance within which the front returns to the axis, as a multiple of half of the
 #: length.
 _RETURN = 0.5
@@ -88,7 +89,7 @@ def occupied_points(
     found, count = np.empty((256, 2)), 0
     for level in range(2):
         if level == 0:
-            hits, cell, least = space.hits, space.cell_m, OCCUPIED_HITS
+            hits, cell, least = space.hits, space.cell_m, _HITS
             box = cells_within(space, x - reach, y - reach, x + reach, y + reach)
         else:
             hits, cell, least = fine.hits, side, _FINE_HITS
@@ -119,7 +120,7 @@ def occupied_points(
 
 
 @njit(cache=True)
-def _sides(points: Any, x: float, y: float) -> Any:  # pragma: no cover  (compiled)
+def sides(points: Any, x: float, y: float) -> Any:  # pragma: no cover  (compiled)
     """Returns the distances of the nearest point and of the nearest one opposite, m."""
     first, at = np.inf, -1
     for k in range(len(points)):
@@ -151,7 +152,7 @@ def _narrow_part(
         x, y = way.path[k]
         step = math.hypot(x - way.path[k - 1, 0], y - way.path[k - 1, 1])
         length += step
-        first, second = _sides(points, x, y)
+        first, second = sides(points, x, y)
         if first + second < 2.0 * radius:
             if begin < 0:
                 if length > _AHEAD_M:
@@ -214,17 +215,16 @@ def fit_axis(
 
 @njit(cache=True)
 def refine_axis(
-    p: Passage, points: Any, half_width: float
+    p: Passage, points: Any, share: float, half_width: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the axis toward that of the present map by ``_GAIN``.
+    """Moves the axis toward that of the present map by a share of the difference.
 
     A map that gives another passage does not change the axis.
     """
     x, y, axis, width = p.middle[0], p.middle[1], p.axis[0], p.width_m[0]
-    fit_axis(p, points, 0.05, _STEPS[1])
+    fit_axis(p, points, 0.06, _STEPS[1])
     moved = math.hypot(p.middle[0] - x, p.middle[1] - y)
-    share = _GAIN
-    if moved > _MOST_SHIFT_M or p.width_m[0] < 1.9 * half_width:
+    if moved > _MOST_SHIFT_M or p.width_m[0] < _NARROWEST * half_width:
         share = 0.0
     p.middle[0], p.middle[1] = x + share * (p.middle[0] - x), y + share * (p.middle[1] - y)
     p.axis[0] = axis + share * (p.axis[0] - axis)
@@ -258,14 +258,14 @@ def find_passage(
     for _ in range(2):
         fit_axis(p, points, 0.8, _STEPS[0])
     fit_axis(p, points, 0.06, _STEPS[1])
-    if p.width_m[0] < 2.0 * half_size[1] or p.width_m[0] >= 2.0 * radius:
+    if p.width_m[0] < _NARROWEST * half_size[1] or p.width_m[0] >= 2.0 * radius:
         return
     p.state[0] = APPROACHING
-    _place_approach(p, points, radius, half_size[0])
+    place_approach(p, points, radius, half_size[0])
 
 
 @njit(cache=True)
-def _place_approach(
+def place_approach(
     p: Passage, points: Any, radius: float, half_length: float
 ) -> None:  # pragma: no cover  (compiled)
     """Places the axle so that its front is on the axis and the disc is clear."""
@@ -276,7 +276,7 @@ def _place_approach(
     for slant in _SLANTS:
         angle = p.axis[0] + slant
         x, y = fx - half_length * math.cos(angle), fy - half_length * math.sin(angle)
-        clear = min(_sides(points, x, y)[0], radius + 0.1)
+        clear = min(sides(points, x, y)[0], radius + 0.2)
         if clear > best + 0.01:
             best, p.approach[0], p.approach[1] = clear, x, y
 

@@ -16,7 +16,9 @@ from systems.planning.passage import (
     front_error,
     lines_up,
     occupied_points,
+    place_approach,
     refine_axis,
+    sides,
 )
 from systems.planning.way import find_way
 from systems.safety.free_space import FreeSpace
@@ -25,6 +27,9 @@ from systems.safety.free_space import FreeSpace
 _REACH_M = 8.0
 #: An axle within this distance of its place has reached it, m.
 _THERE_M = 0.25
+
+#: Share of the difference by which a plan moves the axis while the robot passes.
+_GAIN = 0.3
 
 
 @register_jitable
@@ -46,16 +51,22 @@ def plan_passage(
     points = occupied_points(space, here, _REACH_M, clear)
     if p.state[0] == PASSING:
         along, _ = front_error(p, pose, half_size[0])
-        if along > p.half_m[0] + 2.0 * half_size[0]:
+        first, second = sides(points, pose[0], pose[1])
+        beyond = along - half_size[0] > -p.half_m[0]
+        if beyond and first + second >= 2.0 * radius:
             p.state[0] = OPEN
         else:
             if along < -p.half_m[0] - 0.5 * half_size[0]:
-                refine_axis(p, points, half_size[1])
+                refine_axis(p, points, _GAIN, half_size[1])
             state.memory.passable_s[0] = time
             return
-    find_passage(p, state.way, points, radius, half_size)
     if p.state[0] == OPEN:
-        return
+        find_passage(p, state.way, points, radius, half_size)
+        if p.state[0] == OPEN:
+            return
+    else:
+        refine_axis(p, points, 1.0, half_size[1])
+        place_approach(p, points, radius, half_size[0])
     left = math.hypot(p.approach[0] - pose[0], p.approach[1] - pose[1])
     if left < _THERE_M or lines_up(p, pose, half_size):
         p.state[0] = PASSING

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
 from systems.framework.compiling import njit
 from systems.safety.danger import Danger, nearest_view
@@ -84,8 +85,8 @@ def can_be_braked(
     turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
     slow = in_place and turn <= SLOW_TURN_RAD_S
     # A long body that creeps counts as at rest, too.
-    if numbers.outline.half_length_m >= LONG * numbers.outline.half_width_m:
-        slow = slow or (_creeps(commanded, numbers) and _creeps(speeds, numbers))
+    if not slow and _is_long(numbers):
+        slow = _sweep(commanded, numbers) <= 1.0 and _sweep(speeds, numbers) <= 1.0
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
     begin, disc = pose, outline.radius_m + numbers.keep_m
     # Number of distances from ``gaps`` that separate a cell from the body.
@@ -141,17 +142,25 @@ def can_be_braked(
             commanded = braked(commanded, numbers)
 
 
+@register_jitable
+def _is_long(numbers: BrakingNumbers) -> bool:
+    """Checks whether the body is much longer than wide."""
+    outline = numbers.outline
+    return outline.half_length_m >= LONG * outline.half_width_m
+
+
 @njit(cache=True)
-def _creeps(
-    wheels: Any, numbers: BrakingNumbers
-) -> bool:  # pragma: no cover  (compiled)
-    """Checks whether every point of the body is slower than its corners in a slow turn.
+def _sweep(wheels: Any, numbers: BrakingNumbers) -> float:  # pragma: no cover
+    """Computes the speed of the fastest point of the disc.
 
     ``wheels`` are the speeds of the left and right wheel, rad/s.
+
+    Returns:
+        Speed as a multiple of that in a turn on the spot which counts as rest.
     """
     radius, lever = numbers.wheel_radius_m, numbers.outline.radius_m
     turn = abs(wheels[1] - wheels[0]) * radius / numbers.wheel_separation_m
-    return _ahead(wheels, radius) + turn * lever <= SLOW_TURN_RAD_S * lever
+    return (_ahead(wheels, radius) / lever + turn) / SLOW_TURN_RAD_S
 
 
 @njit(cache=True)
@@ -312,6 +321,12 @@ def chosen(
         part = share * wish[0], share * wish[1]
         if can_be_braked(pose, speeds, part, danger, numbers):
             return PASSED if number == 0 else SLOWED, part
+    sweep = _sweep(wish, numbers)
+    if numbers.obstacle_speed_m_s > 0.0 and sweep > 1.0 and _is_long(numbers):
+        share = 0.99 / sweep
+        part = share * wish[0], share * wish[1]
+        if can_be_braked(pose, speeds, part, danger, numbers):
+            return SLOWED, part
     slower = braked(commanded, numbers)
     ahead, turn = 0.5 * (slower[0] + slower[1]), 0.5 * (wish[1] - wish[0])
     # Limit the turn to the top speed of the wheels. Otherwise the robot would turn less
