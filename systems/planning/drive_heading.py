@@ -12,7 +12,7 @@ from systems.planning.carrot import find_carrot
 from systems.planning.drive_state import DriveNumbers, DriveState
 from systems.planning.following import APPROACH_GAIN, wanted_speed
 from systems.planning.hazards import find_movers
-from systems.planning.passage import APPROACHING, PASSING, along_axis
+from systems.planning.passage import APPROACHING, PASSING, RETREATING, along_axis
 from systems.planning.passing import plan_passage
 from systems.planning.turning import wrapped
 from systems.planning.way import OCCUPIED, TIGHT, find_way
@@ -89,8 +89,10 @@ def find_heading(
         m.planned_s[0] = time
         if way.dearest[0] < OCCUPIED:
             m.passable_s[0] = time
-    if state.passage.state[0] == PASSING:
+    if state.passage.state[0] >= PASSING:
         m.carrot[0], m.carrot[1] = state.passage.middle
+        if state.passage.state[0] == RETREATING:
+            return -numbers.creep_m_s, 0.0, False
         error = along_axis(state.passage, pose, numbers.half_size[0])
         return numbers.creep_m_s, error, False
     carrot = find_carrot(way, x, y, LOOK_AHEAD_M)

@@ -38,7 +38,7 @@ from systems.planning.drive_state import (
 from systems.planning.evasion import choose_motion
 from systems.planning.hazards import pick_hazards, track_hazards
 from systems.planning.look_around import begin_look, look_around
-from systems.planning.passage import OPEN, PASSING
+from systems.planning.passage import OPEN, PASSING, RETREATING
 from systems.planning.turning import TURN_FIRST_RAD, TURN_GAIN, slowed_by, turn_rate, wrapped
 from systems.planning.way import MARK_S, NEAR, mark_blocked
 from systems.safety.braking import TURNED
@@ -142,7 +142,7 @@ def drive_guarded(
         return
     if m.mode[0] == WAITING or m.mode[0] == GIVING_UP:
         m.mode[0] = DRIVING
-    passing = state.passage.state[0] == PASSING
+    passing = state.passage.state[0] >= PASSING
     if m.mode[0] == DRIVING and not passing:
         begin_look(time, pose, pose[2] + error, m, space, numbers)
     if m.mode[0] == LOOKING:
@@ -152,10 +152,15 @@ def drive_guarded(
     if m.mode[0] == DRIVING and time - m.stays_s[0] > _GIVE_UP_S:
         ahead, at = pose[2] + error, numbers.widths[1] + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
-        if not passing:
-            mark_blocked(state.way, place, time + MARK_S)
-        state.passage.state[0] = OPEN
-        begin_backing(m, time)
+        if passing:
+            place = state.passage.middle[0], state.passage.middle[1]
+        mark_blocked(state.way, place, time + MARK_S)
+        if state.passage.state[0] == PASSING:
+            state.passage.state[0] = RETREATING
+            restart_stay(m, pose, time)
+        else:
+            state.passage.state[0] = OPEN
+            begin_backing(m, time)
     if m.mode[0] == BACKING:
         back_off(m, time, pose, error, report)
     if m.mode[0] == DRIVING:
@@ -212,7 +217,7 @@ def _drive(  # type: ignore[no-untyped-def]
     error is large, the robot turns without driving.
     """
     m = state.memory
-    if state.passage.state[0] == PASSING:
+    if state.passage.state[0] >= PASSING:
         m.speed[0] = slowed_by(error, wanted)
         m.turn[0] = turn_rate(error)
         if abs(error) < TURN_FIRST_RAD:

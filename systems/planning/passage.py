@@ -15,19 +15,25 @@ from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
 from systems.planning.turning import wrapped
-from systems.planning.way import Way
-from systems.safety.free_space import FreeSpace, cells_within
+from systems.planning.way import Way, is_near
+from systems.safety.free_space import (
+    PARTS,
+    FineSpace,
+    FreeSpace,
+    cell_is_free,
+    cells_within,
+)
 
-#: States of ``Passage``: there is no passage, the robot drives to its approach, or it
-#: drives along its axis.
-OPEN, APPROACHING, PASSING = range(3)
+#: States of ``Passage``: there is no passage, the robot drives to its approach, it
+#: drives along the axis, or it backs out because the guard has stopped it there.
+OPEN, APPROACHING, PASSING, RETREATING = range(4)
 
 #: A passage begins within this length of the route, m.
 _AHEAD_M = 6.0
 #: Longest part of a passage that counts at once, as a multiple of the disc's radius.
 _LONGEST = 4.0
-#: Least number of hits of an occupied cell, and of an occupied fine cell.
-_HITS, _FINE_HITS = 3.0, 1.5
+#: Least number of hits of an occupied cell.
+_HITS = 3.0
 # ``_LINED_UP_RAD``: largest heading error at the begin of the passage, rad.
 # ``_LINED_UP``: largest distance from the axis there, as a multiple of the half width.
 _LINED_UP_RAD, _LINED_UP = 0.04, 0.03
@@ -37,6 +43,12 @@ _APPROACH = 3.0
 _SLANTS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.0, -1.0)
 #: Steps of the search for the axis: coarse and fine, rad.
 _STEPS = 0.05, 0.005
+# ``_PIECE_M``: length of a piece of a wall, m.
+# ``_FEW``: share of the pieces that may be nearer than the wall.
+# ``_NO_WALL_M``: distance of a wall that is not there, m.
+_PIECE_M, _FEW, _NO_WALL_M = 0.05, 0.25, 3.0
+#: Weight of the mean deviation of the walls from a straight line against the width.
+_STRAIGHT = 20.0
 #: An axis that is farther beside is that of another passage, m.
 _MOST_SHIFT_M = 0.15
 #: Least measured width of a passage, as a multiple of half of the body's width.
@@ -72,7 +84,10 @@ def make_passage() -> Passage:
 def occupied_points(
     space: FreeSpace, place: Any, reach: float, clear: Any
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """Lists the middles of occupied cells in a square, fine cells where there are some.
+    """Lists the middles of the occupied cells in a square.
+
+    Within the window of the fine cells, the function lists those fine cells of occupied
+    cells that were not seen free.
 
     Args:
         space: Map of free space with fine cells.
@@ -83,40 +98,38 @@ def occupied_points(
     Returns:
         (n, 2) positions, m.
     """
-    (x, y), fine = place, space.fine
-    size, side = len(fine.hits), fine.cell_m
-    low_x, low_y = fine.first[0] * side, fine.first[1] * side
-    found, count = np.empty((256, 2)), 0
-    for level in range(2):
-        if level == 0:
-            hits, cell, least = space.hits, space.cell_m, _HITS
-            box = cells_within(space, x - reach, y - reach, x + reach, y + reach)
-        else:
-            hits, cell, least = fine.hits, side, _FINE_HITS
-            box = cells_within(fine, x - reach, y - reach, x + reach, y + reach)
-        cells = len(hits)
-        for i in range(box[0], box[2] + 1):
-            for j in range(box[1], box[3] + 1):
-                if hits[i % cells, j % cells] < least:
-                    continue
-                px, py = (i + 0.5) * cell, (j + 0.5) * cell
-                inside = 0.0 <= px - low_x < size * side
-                inside = inside and 0.0 <= py - low_y < size * side
-                if level == 0 and inside:
-                    continue
-                near = False
-                for k in range(len(clear)):
-                    off = math.hypot(px - clear[k, 0], py - clear[k, 1])
-                    near = near or off < clear[k, 2]
-                if near:
-                    continue
-                if count == len(found):
-                    more = np.empty((2 * count, 2))
-                    more[:count] = found
-                    found = more
+    (x, y), fine, cells = place, space.fine, len(space.hits)
+    found, count, small = np.empty((256, 2)), 0, fine.cell_m
+    box = cells_within(space, x - reach, y - reach, x + reach, y + reach)
+    for i in range(box[0], box[2] + 1):
+        for j in range(box[1], box[3] + 1):
+            if space.hits[i % cells, j % cells] < _HITS:
+                continue
+            px, py = (i + 0.5) * space.cell_m, (j + 0.5) * space.cell_m
+            if is_near(clear, px, py):
+                continue
+            if count + PARTS * PARTS > len(found):
+                more = np.empty((2 * len(found), 2))
+                more[:count] = found[:count]
+                found = more
+            if not _in_window(fine, i, j):
                 found[count, 0], found[count, 1] = px, py
                 count += 1
+                continue
+            for a in range(i * PARTS, (i + 1) * PARTS):
+                for b in range(j * PARTS, (j + 1) * PARTS):
+                    if not cell_is_free(fine, a, b, space.rolled_m[0]):
+                        found[count, 0], found[count, 1] = (a + 0.5) * small, (b + 0.5) * small
+                        count += 1
     return found[:count]
+
+
+@register_jitable
+def _in_window(fine: FineSpace, i: int, j: int) -> bool:
+    """Checks whether all fine cells of a cell are in their window."""
+    size = len(fine.hits)
+    a, b = i * PARTS - fine.first[0], j * PARTS - fine.first[1]
+    return 0 <= a <= size - PARTS and 0 <= b <= size - PARTS
 
 
 @njit(cache=True)
@@ -169,44 +182,62 @@ def _narrow_part(
 
 
 @njit(cache=True)
-def _gap(
+def _walls(
     points: Any, middle: Any, angle: float, half: float
-) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Returns how far the nearest points are to the right and left of a line, m."""
+) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
+    """Measures the walls beside a line.
+
+    The part of the line within ``half`` of the middle is divided into pieces. On each
+    side, the wall is at a distance that few pieces fall below, because echoes of a wide
+    beam may seem to come from points in front of the wall.
+
+    Returns:
+        Distances of the right and of the left wall, and mean absolute deviation of the
+        pieces from these distances, m.
+    """
     c, s = math.cos(angle), math.sin(angle)
-    right, left = 3.0, 3.0
+    pieces = max(1, math.ceil(2.0 * half / _PIECE_M))
+    nearest = np.full((2, pieces), np.inf)
     for k in range(len(points)):
         dx, dy = points[k, 0] - middle[0], points[k, 1] - middle[1]
-        if abs(c * dx + s * dy) <= half:
+        piece = math.floor((c * dx + s * dy + half) / (2.0 * half) * pieces)
+        if 0 <= piece < pieces:
             v = c * dy - s * dx
-            if v > 0.0:
-                left = min(left, v)
-            else:
-                right = min(right, -v)
-    return right, left
+            side = 1 if v > 0.0 else 0
+            nearest[side, piece] = min(nearest[side, piece], abs(v))
+    walls, deviation, count = np.full(2, _NO_WALL_M), 0.0, 0
+    for side in range(2):
+        ordered = np.sort(nearest[side])
+        known = int(np.searchsorted(ordered, _NO_WALL_M))
+        if known > 0:
+            walls[side] = ordered[int(_FEW * known)]
+            middle_one = ordered[known // 2]
+            for k in range(known):
+                deviation += min(abs(ordered[k] - middle_one), 0.1)
+            count += known
+    return walls[0], walls[1], deviation / max(count, 1)
 
 
 @njit(cache=True)
 def fit_axis(
     p: Passage, points: Any, spread: float, step: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Turns and shifts the axis so that the passage along it is as wide as possible.
+    """Turns and shifts the axis so that the passage is wide and its walls straight.
 
     The directions differ from the present one by at most ``spread``, rad, in steps of
-    ``step``. Of directions with the same width, the mean counts.
+    ``step``.
     """
-    begin, widest = p.axis[0], -1.0
-    total, count = 0.0, 0
+    begin, best, found = p.axis[0], -np.inf, 0.0
     steps = math.ceil(spread / step)
     for n in range(-steps, steps + 1):
-        right, left = _gap(points, p.middle, begin + n * step, p.half_m[0])
-        width = right + left
-        if width > widest + 0.002:
-            widest, total, count = width, 0.0, 0
-        if width > widest - 0.002:
-            total, count = total + n * step, count + 1
-    p.axis[0] = angle = begin + total / count
-    right, left = _gap(points, p.middle, angle, p.half_m[0])
+        right, left, deviation = _walls(
+            points, p.middle, begin + n * step, p.half_m[0]
+        )
+        score = right + left - _STRAIGHT * deviation
+        if score > best:
+            best, found = score, n * step
+    p.axis[0] = angle = begin + found
+    right, left, _ = _walls(points, p.middle, angle, p.half_m[0])
     shift = 0.5 * (left - right)
     p.middle[0] -= shift * math.sin(angle)
     p.middle[1] += shift * math.cos(angle)
@@ -254,7 +285,7 @@ def find_passage(
     p.middle[0], p.middle[1] = m[0], m[1]
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     p.axis[0] = math.atan2(b[1] - a[1], b[0] - a[0])
-    p.half_m[0] = max(0.5 * length, 0.5 * radius)
+    p.half_m[0] = max(0.5 * length, radius)
     for _ in range(2):
         fit_axis(p, points, 0.8, _STEPS[0])
     fit_axis(p, points, 0.06, _STEPS[1])

@@ -12,6 +12,7 @@ from systems.planning.passage import (
     APPROACHING,
     OPEN,
     PASSING,
+    RETREATING,
     find_passage,
     front_error,
     lines_up,
@@ -28,6 +29,9 @@ _REACH_M = 8.0
 #: An axle within this distance of its place has reached it, m.
 _THERE_M = 0.25
 
+#: Distance of the front from the passage at which the robot has backed out, as a multiple
+#: of half of the length.
+_BACK = 1.5
 #: Share of the difference by which a plan moves the axis while the robot passes.
 _GAIN = 0.3
 
@@ -49,6 +53,11 @@ def plan_passage(
     p, half_size, radius = state.passage, numbers.half_size, numbers.widths[1]
     here = pose[0], pose[1]
     points = occupied_points(space, here, _REACH_M, clear)
+    if p.state[0] == RETREATING:
+        along, _ = front_error(p, pose, half_size[0])
+        if along > -p.half_m[0] - _BACK * half_size[0]:
+            return
+        p.state[0] = OPEN
     if p.state[0] == PASSING:
         along, _ = front_error(p, pose, half_size[0])
         first, second = sides(points, pose[0], pose[1])

@@ -215,7 +215,7 @@ def _set_prices(
             if hits < _DOUBTFUL_HITS:
                 continue
             x, y = (low[0] + 0.5 * i + 0.25) * cell, (low[1] + 0.5 * j + 0.25) * cell
-            if not _is_near(clear, x, y):
+            if not is_near(clear, x, y):
                 highest = OCCUPIED if hits >= OCCUPIED_HITS else DOUBTFUL
                 _keep_off(way, (x, y), widths, highest)
     for k in range(len(way.marks)):
@@ -225,7 +225,7 @@ def _set_prices(
 
 
 @njit(cache=True)
-def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (compiled)
+def is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (compiled)
     """Checks whether a point is within the radius of a position in ``clear``."""
     for k in range(len(clear)):
         if math.hypot(x - clear[k, 0], y - clear[k, 1]) < clear[k, 2]:
