@@ -49,6 +49,9 @@ _STEPS = 0.05, 0.005
 _PIECE_M, _FEW, _NO_WALL_M = 0.05, 0.25, 3.0
 #: Weight of the mean deviation of the walls from a straight line against the width.
 _STRAIGHT = 20.0
+# ``_CENTER_GAIN``: share of the difference by which a plan moves the axis in a passage.
+# ``_BESIDE_M``: distance from the body within which there is a passage, m.
+_CENTER_GAIN, _BESIDE_M = 0.3, 0.15
 #: An axis that is farther beside is that of another passage, m.
 _MOST_SHIFT_M = 0.15
 #: Least measured width of a passage, as a multiple of half of the body's width.
@@ -260,6 +263,55 @@ def refine_axis(
     p.middle[0], p.middle[1] = x + share * (p.middle[0] - x), y + share * (p.middle[1] - y)
     p.axis[0] = axis + share * (p.axis[0] - axis)
     p.width_m[0] = width + share * (p.width_m[0] - width)
+
+
+@njit(cache=True)
+def center_axis(
+    p: Passage, space: FreeSpace, pose: Any, radius: float, half_width: float
+) -> None:  # pragma: no cover  (compiled)
+    """Moves the axis toward the middle of the free space beside the body.
+
+    The front half and the rear half of the disc count separately, and only if there is
+    non-free space on both sides of the body.
+
+    Args:
+        p: Passage. The function changes the arrays in place.
+        space: Map of free space with fine cells.
+        pose: Pose (x, y, theta) of the body, m and rad.
+        radius: Radius of the disc around the body, m.
+        half_width: Half of the width of the body, m.
+    """
+    fine, c, s = space.fine, math.cos(p.axis[0]), math.sin(p.axis[0])
+    x, y, cell, widest = pose[0], pose[1], space.fine.cell_m, half_width + _BESIDE_M
+    walls = np.full((2, 2), np.inf)
+    box = cells_within(fine, x - radius, y - radius, x + radius, y + radius)
+    for i in range(box[0], box[2] + 1):
+        for j in range(box[1], box[3] + 1):
+            if cell_is_free(fine, i, j, space.rolled_m[0]):
+                continue
+            if cell_is_free(space, i // PARTS, j // PARTS, space.rolled_m[0]):
+                continue
+            dx, dy = (i + 0.5) * cell, (j + 0.5) * cell
+            u, v = c * (dx - x) + s * (dy - y), 0.0
+            v = c * (dy - p.middle[1]) - s * (dx - p.middle[0])
+            if abs(u) < radius:
+                half, side = (1 if u > 0.0 else 0), (1 if v > 0.0 else 0)
+                walls[half, side] = min(walls[half, side], abs(v))
+    shifts, count = np.zeros(2), 0
+    for half in range(2):
+        if walls[half, 0] < widest and walls[half, 1] < widest:
+            shifts[half] = 0.5 * (walls[half, 1] - walls[half, 0])
+            count += 1
+    if count == 0:
+        return
+    shift = _CENTER_GAIN * (shifts[0] + shifts[1]) / count
+    p.middle[0], p.middle[1] = p.middle[0] - shift * s, p.middle[1] + shift * c
+    if count == 2:
+        # The line turns about the middle of the body.
+        turn = _CENTER_GAIN * (shifts[1] - shifts[0]) / radius
+        dx, dy = p.middle[0] - x, p.middle[1] - y
+        p.middle[0], p.middle[1] = x + dx - turn * dy, y + dy + turn * dx
+        p.axis[0] += turn
 
 
 @njit(cache=True)

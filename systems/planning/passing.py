@@ -13,6 +13,7 @@ from systems.planning.passage import (
     OPEN,
     PASSING,
     RETREATING,
+    center_axis,
     find_passage,
     front_error,
     lines_up,
@@ -67,6 +68,7 @@ def plan_passage(
         else:
             if along < -p.half_m[0] - 0.5 * half_size[0]:
                 refine_axis(p, points, _GAIN, half_size[1])
+            center_axis(p, space, pose, radius, half_size[1])
             state.memory.passable_s[0] = time
             return
     if p.state[0] == OPEN:
