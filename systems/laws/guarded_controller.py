@@ -29,9 +29,8 @@ from systems.safety.views import range_errors
 _CLEARANCE_M = 0.02
 #: Share of the top speed at which a fast robot drives. The rest is left for turns.
 _CRUISE_SHARE = 0.86
-#: Share of the largest creeping speed at which a long body passes. The rest is left for
-#: turns.
-_CREEP_SHARE = 0.8
+#: Share of the largest speed that counts as rest at which a long body passes.
+_CREEP_SHARE = 0.96
 
 
 def guarded_step(

@@ -89,12 +89,12 @@ def find_heading(
         m.planned_s[0] = time
         if way.dearest[0] < OCCUPIED:
             m.passable_s[0] = time
-    if state.passage.state[0] >= PASSING:
-        m.carrot[0], m.carrot[1] = state.passage.middle
-        if state.passage.state[0] == RETREATING:
+    p = state.passage
+    if p.state[0] == PASSING or p.state[0] == RETREATING:
+        m.carrot[0], m.carrot[1] = p.middle
+        if p.state[0] == RETREATING:
             return -numbers.creep_m_s, 0.0, False
-        error = along_axis(state.passage, pose, numbers.half_size[0])
-        return numbers.creep_m_s, error, False
+        return numbers.creep_m_s, along_axis(p, pose, numbers.half_size[0]), False
     carrot = find_carrot(way, x, y, LOOK_AHEAD_M)
     # Distance from P to the target, and from the axle.
     follow, offset = numbers.follow_distance_m, numbers.control_point_m

@@ -39,7 +39,8 @@ from systems.planning.evasion import choose_motion
 from systems.planning.hazards import pick_hazards, track_hazards
 from systems.planning.look_around import begin_look, look_around
 from systems.planning.passage import OPEN, PASSING, RETREATING
-from systems.planning.turning import TURN_FIRST_RAD, TURN_GAIN, slowed_by, turn_rate, wrapped
+from systems.planning.passing import drive_in_passage
+from systems.planning.turning import TURN_GAIN, slowed_by, turn_rate, wrapped
 from systems.planning.way import MARK_S, NEAR, mark_blocked
 from systems.safety.braking import TURNED
 
@@ -152,19 +153,18 @@ def drive_guarded(
     if m.mode[0] == DRIVING and time - m.stays_s[0] > _GIVE_UP_S:
         ahead, at = pose[2] + error, numbers.widths[1] + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
-        if passing:
-            place = state.passage.middle[0], state.passage.middle[1]
-        mark_blocked(state.way, place, time + MARK_S)
         if state.passage.state[0] == PASSING:
             state.passage.state[0] = RETREATING
+            state.passage.failures[0] += 1.0
             restart_stay(m, pose, time)
         else:
+            mark_blocked(state.way, place, time + MARK_S)
             state.passage.state[0] = OPEN
             begin_backing(m, time)
     if m.mode[0] == BACKING:
         back_off(m, time, pose, error, report)
     if m.mode[0] == DRIVING:
-        _drive(time, velocity, wanted, error, there, state, numbers)
+        _drive(time, pose, velocity, wanted, error, there, state, numbers)
     _evade(time, pose, wanted, error, state, numbers)
 
 
@@ -206,7 +206,7 @@ def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untype
 
 @register_jitable
 def _drive(  # type: ignore[no-untyped-def]
-    time, velocity, wanted, error, there, state, numbers
+    time, pose, velocity, wanted, error, there, state, numbers
 ):
     """Drives toward the carrot, which is a point of the route (``find_heading``).
 
@@ -218,11 +218,7 @@ def _drive(  # type: ignore[no-untyped-def]
     """
     m = state.memory
     if state.passage.state[0] >= PASSING:
-        m.speed[0] = slowed_by(error, wanted)
-        m.turn[0] = turn_rate(error)
-        if abs(error) < TURN_FIRST_RAD:
-            # This twist moves the front in the wanted direction.
-            m.turn[0] = wanted * math.sin(error) / numbers.half_size[0]
+        drive_in_passage(m, state.passage, pose[2], wanted, error, numbers)
         return
     if there and numbers.follow_distance_m < numbers.control_point_m:
         # This twist gives P the wanted velocity.

@@ -25,8 +25,9 @@ from systems.safety.free_space import (
 )
 
 #: States of ``Passage``: there is no passage, the robot drives to its approach, it
-#: drives along the axis, or it backs out because the guard has stopped it there.
-OPEN, APPROACHING, PASSING, RETREATING = range(4)
+#: drives along the axis, it backs out because the guard has stopped it there, or it turns
+#: away from a wall behind the passage.
+OPEN, APPROACHING, PASSING, RETREATING, LEAVING = range(5)
 
 #: A passage begins within this length of the route, m.
 _AHEAD_M = 6.0
@@ -36,9 +37,9 @@ _LONGEST = 4.0
 _HITS = 3.0
 # ``_LINED_UP_RAD``: largest heading error at the begin of the passage, rad.
 # ``_LINED_UP``: largest distance from the axis there, as a multiple of the half width.
-_LINED_UP_RAD, _LINED_UP = 0.04, 0.03
+_LINED_UP_RAD, _LINED_UP = 0.025, 0.03
 #: Distance from the approach to the passage, as a multiple of half of the length.
-_APPROACH = 3.0
+_APPROACH = 3.4
 #: Directions from which the front may come to the approach, from the axis, rad.
 _SLANTS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.0, -1.0)
 #: Steps of the search for the axis: coarse and fine, rad.
@@ -76,11 +77,13 @@ class Passage(NamedTuple):
     """Width of the passage, m."""
     approach: NDArray[np.float64]
     """(2,) point (x, y) from which the axle starts along the axis, m."""
+    failures: NDArray[np.float64]
+    """Number of times that the guard has stopped the robot in this passage."""
 
 
 def make_passage() -> Passage:
     """Makes the memory without a passage."""
-    return Passage(*(np.zeros(n) for n in (1, 2, 1, 1, 1, 2)))
+    return Passage(*(np.zeros(n) for n in (1, 2, 1, 1, 1, 2, 1)))
 
 
 @njit(cache=True)
@@ -343,7 +346,7 @@ def find_passage(
     fit_axis(p, points, 0.06, _STEPS[1])
     if p.width_m[0] < _NARROWEST * half_size[1] or p.width_m[0] >= 2.0 * radius:
         return
-    p.state[0] = APPROACHING
+    p.state[0], p.failures[0] = APPROACHING, 0.0
     place_approach(p, points, radius, half_size[0])
 
 

@@ -7,12 +7,14 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-from systems.planning.drive_state import DriveNumbers, DriveState
+from systems.planning.drive_state import DriveMemory, DriveNumbers, DriveState
 from systems.planning.passage import (
     APPROACHING,
+    LEAVING,
     OPEN,
     PASSING,
     RETREATING,
+    Passage,
     center_axis,
     find_passage,
     front_error,
@@ -22,7 +24,8 @@ from systems.planning.passage import (
     refine_axis,
     sides,
 )
-from systems.planning.way import find_way
+from systems.planning.turning import TURN_FIRST_RAD, turn_rate, wrapped
+from systems.planning.way import MARK_S, find_way, mark_blocked
 from systems.safety.free_space import FreeSpace
 
 #: Distance from the robot within which occupied cells count, m.
@@ -30,9 +33,12 @@ _REACH_M = 8.0
 #: An axle within this distance of its place has reached it, m.
 _THERE_M = 0.25
 
-#: Distance of the front from the passage at which the robot has backed out, as a multiple
-#: of half of the length.
-_BACK = 1.5
+# A robot backs out at least and at most so far, as a multiple of half of its length.
+_BACK, _FARTHEST = 0.5, 4.0
+#: Number of times that the robot tries to pass before it looks for another way.
+_TRIES = 3
+#: Angle to the axis at which a leaving robot begins to turn away, rad.
+_LEAVE_RAD = 0.05
 #: Share of the difference by which a plan moves the axis while the robot passes.
 _GAIN = 0.3
 
@@ -58,19 +64,30 @@ def plan_passage(
         along, _ = front_error(p, pose, half_size[0])
         if along > -p.half_m[0] - _BACK * half_size[0]:
             return
-        p.state[0] = OPEN
+        if p.failures[0] < _TRIES and lines_up(p, pose, half_size):
+            p.state[0] = PASSING
+        elif along < -p.half_m[0] - _FARTHEST * half_size[0]:
+            place = p.middle[0], p.middle[1]
+            mark_blocked(state.way, place, time + MARK_S)
+            p.state[0] = OPEN
+        else:
+            return
     if p.state[0] == PASSING:
         along, _ = front_error(p, pose, half_size[0])
         first, second = sides(points, pose[0], pose[1])
         beyond = along - half_size[0] > -p.half_m[0]
         if beyond and first + second >= 2.0 * radius:
-            p.state[0] = OPEN
+            p.state[0] = LEAVING
         else:
             if along < -p.half_m[0] - 0.5 * half_size[0]:
                 refine_axis(p, points, _GAIN, half_size[1])
             center_axis(p, space, pose, radius, half_size[1])
             state.memory.passable_s[0] = time
             return
+    if p.state[0] == LEAVING:
+        if sides(points, pose[0], pose[1])[0] < radius:
+            return
+        p.state[0] = OPEN
     if p.state[0] == OPEN:
         find_passage(p, state.way, points, radius, half_size)
         if p.state[0] == OPEN:
@@ -84,3 +101,34 @@ def plan_passage(
         return
     place = p.approach[0], p.approach[1]
     find_way(state.way, space, here, place, time, numbers.widths, clear)
+
+
+@register_jitable
+def drive_in_passage(
+    m: DriveMemory,
+    p: Passage,
+    theta: float,
+    wanted: float,
+    error: float,
+    numbers: DriveNumbers,
+) -> None:
+    """Computes the twist of a robot that passes, backs out, or leaves.
+
+    All points of the body are slow enough that the motion counts as rest. While the
+    robot passes, the middle of its front moves in the wanted direction, so that the
+    body comes in line behind it. While it leaves, it turns only so fast that no corner
+    of its rear comes nearer to the wall.
+    """
+    half_length, radius = numbers.half_size[0], numbers.widths[1]
+    if p.state[0] == LEAVING:
+        rate = (abs(wrapped(theta - p.axis[0])) + _LEAVE_RAD) / half_length
+        rate *= min(max(error / _LEAVE_RAD, -1.0), 1.0)
+        speed = numbers.creep_m_s / (1.0 + abs(rate) * radius)
+        m.speed[0], m.turn[0] = speed, speed * rate
+        return
+    if abs(error) > TURN_FIRST_RAD:
+        m.speed[0], m.turn[0] = 0.0, turn_rate(error)
+        return
+    ahead, rate = math.cos(error), math.sin(error) / half_length
+    speed = math.copysign(numbers.creep_m_s, wanted) / (ahead + abs(rate) * radius)
+    m.speed[0], m.turn[0] = speed * ahead, speed * rate
