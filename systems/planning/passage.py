@@ -53,8 +53,6 @@ _STRAIGHT = 20.0
 # ``_CENTER_GAIN``: share of the difference by which a plan moves the axis in a passage.
 # ``_BESIDE_M``: distance from the body within which there is a passage, m.
 _CENTER_GAIN, _BESIDE_M = 0.3, 0.15
-#: An axis that is farther beside is that of another passage, m.
-_MOST_SHIFT_M = 0.15
 #: Least measured width of a passage, as a multiple of half of the body's width.
 _NARROWEST = 1.6
 #: Distance within which the front returns to the axis, as a multiple of half of the
@@ -79,11 +77,13 @@ class Passage(NamedTuple):
     """(2,) point (x, y) from which the axle starts along the axis, m."""
     failures: NDArray[np.float64]
     """Number of times that the guard has stopped the robot in this passage."""
+    maps: NDArray[np.float64]
+    """Number of maps of which the axis is the mean."""
 
 
 def make_passage() -> Passage:
     """Makes the memory without a passage."""
-    return Passage(*(np.zeros(n) for n in (1, 2, 1, 1, 1, 2, 1)))
+    return Passage(*(np.zeros(n) for n in (1, 2, 1, 1, 1, 2, 1, 1)))
 
 
 @njit(cache=True)
@@ -252,17 +252,18 @@ def fit_axis(
 
 @njit(cache=True)
 def refine_axis(
-    p: Passage, points: Any, share: float, half_width: float
+    p: Passage, points: Any, most_m: float, half_width: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the axis toward that of the present map by a share of the difference.
+    """Moves the axis toward that of the present map, to the mean of all maps so far.
 
-    A map that gives another passage does not change the axis.
+    A map whose axis is farther beside than ``most_m``, m, does not count.
     """
     x, y, axis, width = p.middle[0], p.middle[1], p.axis[0], p.width_m[0]
     fit_axis(p, points, 0.06, _STEPS[1])
-    moved = math.hypot(p.middle[0] - x, p.middle[1] - y)
-    if moved > _MOST_SHIFT_M or p.width_m[0] < _NARROWEST * half_width:
-        share = 0.0
+    moved, share = math.hypot(p.middle[0] - x, p.middle[1] - y), 0.0
+    if moved <= most_m and p.width_m[0] >= _NARROWEST * half_width:
+        p.maps[0] += 1.0
+        share = 1.0 / p.maps[0]
     p.middle[0], p.middle[1] = x + share * (p.middle[0] - x), y + share * (p.middle[1] - y)
     p.axis[0] = axis + share * (p.axis[0] - axis)
     p.width_m[0] = width + share * (p.width_m[0] - width)

@@ -39,8 +39,10 @@ _BACK, _FARTHEST = 0.5, 4.0
 _TRIES = 3
 #: Angle to the axis at which a leaving robot begins to turn away, rad.
 _LEAVE_RAD = 0.05
-#: Share of the difference by which a plan moves the axis while the robot passes.
-_GAIN = 0.3
+#: Angle to the axis at which it has turned away, rad.
+_AWAY_RAD = 0.4
+#: While the robot passes, a map whose axis is farther beside does not count, m.
+_NEAR_M = 0.06
 
 
 @register_jitable
@@ -64,6 +66,8 @@ def plan_passage(
         along, _ = front_error(p, pose, half_size[0])
         if along > -p.half_m[0] - _BACK * half_size[0]:
             return
+        p.maps[0] = 0.0
+        refine_axis(p, points, radius, half_size[1])
         if p.failures[0] < _TRIES and lines_up(p, pose, half_size):
             p.state[0] = PASSING
         elif along < -p.half_m[0] - _FARTHEST * half_size[0]:
@@ -80,12 +84,13 @@ def plan_passage(
             p.state[0] = LEAVING
         else:
             if along < -p.half_m[0] - 0.5 * half_size[0]:
-                refine_axis(p, points, _GAIN, half_size[1])
+                refine_axis(p, points, _NEAR_M, half_size[1])
             center_axis(p, space, pose, radius, half_size[1])
             state.memory.passable_s[0] = time
             return
     if p.state[0] == LEAVING:
-        if sides(points, pose[0], pose[1])[0] < radius:
+        angle = abs(wrapped(pose[2] - p.axis[0]))
+        if angle < _AWAY_RAD and sides(points, pose[0], pose[1])[0] < radius:
             return
         p.state[0] = OPEN
     if p.state[0] == OPEN:
@@ -93,7 +98,8 @@ def plan_passage(
         if p.state[0] == OPEN:
             return
     else:
-        refine_axis(p, points, 1.0, half_size[1])
+        p.maps[0] = 0.0
+        refine_axis(p, points, radius, half_size[1])
         place_approach(p, points, radius, half_size[0])
     left = math.hypot(p.approach[0] - pose[0], p.approach[1] - pose[1])
     if left < _THERE_M or lines_up(p, pose, half_size):
