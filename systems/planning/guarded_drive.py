@@ -38,7 +38,7 @@ from systems.planning.drive_state import (
 from systems.planning.evasion import choose_motion
 from systems.planning.hazards import pick_hazards, track_hazards
 from systems.planning.look_around import begin_look, look_around
-from systems.planning.passage import OPEN, PASSING, RETREATING
+from systems.planning.passage import OPEN, PASSING
 from systems.planning.passing import drive_in_passage
 from systems.planning.turning import TURN_GAIN, slowed_by, turn_rate, wrapped
 from systems.planning.way import MARK_S, NEAR, mark_blocked
@@ -133,7 +133,8 @@ def drive_guarded(
         restart_stay(m, pose, time)
     # Timer 2: how long the guard has blocked the robot. A guard that passes the
     # command, or only slows the robot, does not block the robot.
-    if report[0] < TURNED or there or wanted <= 0.0:
+    passing = state.passage.state[0] >= PASSING
+    if report[0] < TURNED or there or (wanted <= 0.0 and not passing):
         m.blocked_s[0] = time
     # Timer 3: how long all routes have led through occupied cells.
     if time - m.passable_s[0] > _SEARCH_WAY_S and not there:
@@ -143,24 +144,20 @@ def drive_guarded(
         return
     if m.mode[0] == WAITING or m.mode[0] == GIVING_UP:
         m.mode[0] = DRIVING
-    passing = state.passage.state[0] >= PASSING
     if m.mode[0] == DRIVING and not passing:
         begin_look(time, pose, pose[2] + error, m, space, numbers)
     if m.mode[0] == LOOKING:
         look_around(time, pose, report, state)
     # The robot has stayed in one place for too long. It marks the place in front of it
     # as blocked, backs off, and plans a new route.
+    if passing:
+        restart_stay(m, pose, time)
     if m.mode[0] == DRIVING and time - m.stays_s[0] > _GIVE_UP_S:
         ahead, at = pose[2] + error, numbers.widths[1] + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
-        if state.passage.state[0] == PASSING:
-            state.passage.state[0] = RETREATING
-            state.passage.failures[0] += 1.0
-            restart_stay(m, pose, time)
-        else:
-            mark_blocked(state.way, place, time + MARK_S)
-            state.passage.state[0] = OPEN
-            begin_backing(m, time)
+        mark_blocked(state.way, place, time + MARK_S)
+        state.passage.state[0] = OPEN
+        begin_backing(m, time)
     if m.mode[0] == BACKING:
         back_off(m, time, pose, error, report)
     if m.mode[0] == DRIVING:

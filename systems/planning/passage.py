@@ -75,6 +75,8 @@ class Passage(NamedTuple):
     """Width of the passage, m."""
     approach: NDArray[np.float64]
     """(2,) point (x, y) from which the axle starts along the axis, m."""
+    backed_from: NDArray[np.float64]
+    """Position of the front along the axis at which the robot began to back out, m."""
     failures: NDArray[np.float64]
     """Number of times that the guard has stopped the robot in this passage."""
     maps: NDArray[np.float64]
@@ -83,7 +85,7 @@ class Passage(NamedTuple):
 
 def make_passage() -> Passage:
     """Makes the memory without a passage."""
-    return Passage(*(np.zeros(n) for n in (1, 2, 1, 1, 1, 2, 1, 1)))
+    return Passage(*(np.zeros(n) for n in (1, 2, 1, 1, 1, 2, 1, 1, 1)))
 
 
 @njit(cache=True)

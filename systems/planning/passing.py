@@ -34,9 +34,11 @@ _REACH_M = 8.0
 _THERE_M = 0.25
 
 # A robot backs out at least and at most so far, as a multiple of half of its length.
-_BACK, _FARTHEST = 0.5, 4.0
+_BACK, _FARTHEST = 0.3, 4.0
 #: Number of times that the robot tries to pass before it looks for another way.
-_TRIES = 3
+_TRIES = 6
+#: Time for which the guard holds the robot before it backs out, s.
+_PATIENCE_S = 1.0
 #: Angle to the axis at which a leaving robot begins to turn away, rad.
 _LEAVE_RAD = 0.05
 #: Angle to the axis at which it has turned away, rad.
@@ -62,20 +64,22 @@ def plan_passage(
     p, half_size, radius = state.passage, numbers.half_size, numbers.widths[1]
     here = pose[0], pose[1]
     points = occupied_points(space, here, _REACH_M, clear)
+    if p.state[0] >= PASSING:
+        state.memory.passable_s[0] = time
     if p.state[0] == RETREATING:
-        along, _ = front_error(p, pose, half_size[0])
-        if along > -p.half_m[0] - _BACK * half_size[0]:
+        if not _has_backed(time, pose, state, half_size):
             return
-        p.maps[0] = 0.0
-        refine_axis(p, points, radius, half_size[1])
-        if p.failures[0] < _TRIES and lines_up(p, pose, half_size):
-            p.state[0] = PASSING
-        elif along < -p.half_m[0] - _FARTHEST * half_size[0]:
+        if p.failures[0] >= _TRIES:
             place = p.middle[0], p.middle[1]
             mark_blocked(state.way, place, time + MARK_S)
             p.state[0] = OPEN
         else:
-            return
+            p.state[0], state.memory.blocked_s[0] = PASSING, time
+    if p.state[0] == PASSING and time - state.memory.blocked_s[0] > _PATIENCE_S:
+        p.state[0], state.memory.blocked_s[0] = RETREATING, time
+        p.failures[0] += 1.0
+        p.backed_from[0], _ = front_error(p, pose, half_size[0])
+        return
     if p.state[0] == PASSING:
         along, _ = front_error(p, pose, half_size[0])
         first, second = sides(points, pose[0], pose[1])
@@ -86,7 +90,6 @@ def plan_passage(
             if along < -p.half_m[0] - 0.5 * half_size[0]:
                 refine_axis(p, points, _NEAR_M, half_size[1])
             center_axis(p, space, pose, radius, half_size[1])
-            state.memory.passable_s[0] = time
             return
     if p.state[0] == LEAVING:
         angle = abs(wrapped(pose[2] - p.axis[0]))
@@ -107,6 +110,21 @@ def plan_passage(
         return
     place = p.approach[0], p.approach[1]
     find_way(state.way, space, here, place, time, numbers.widths, clear)
+
+
+@register_jitable
+def _has_backed(time: float, pose: Any, state: DriveState, half_size: Any) -> bool:
+    """Checks whether a robot that backs out is far enough for another try."""
+    p, back = state.passage, _BACK
+    along, _ = front_error(p, pose, half_size[0])
+    if p.failures[0] >= _TRIES:
+        back = _FARTHEST
+    # A robot that has not entered yet may line up better from farther away.
+    elif along < -p.half_m[0] and not lines_up(p, pose, half_size):
+        back = _FARTHEST
+    if time - state.memory.blocked_s[0] > _PATIENCE_S:
+        return True
+    return along < p.backed_from[0] - back * half_size[0]
 
 
 @register_jitable

@@ -27,12 +27,11 @@ from systems.safety.free_space import (
 )
 from systems.safety.outline import Outline
 from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
-from systems.safety.seen_cells import end_view, see
+from systems.safety.seen_cells import ROWS, end_view, see
 from systems.safety.views import (
     RANGE_MARGIN_M,
     PlaceError,
     Sectors,
-    checked_reach,
     lasting,
     range_errors,
     sensor_sectors,
@@ -40,6 +39,8 @@ from systems.safety.views import (
 
 #: Largest angle between two points of a sensor's arc, seen from the sensor, rad.
 _ARC_STEP = 0.035
+#: Distance from the disc around a long body up to which there are fine cells, m.
+_FINE_AHEAD_M = 0.6
 
 
 class MapNumbers(NamedTuple):
@@ -144,9 +145,9 @@ def map_step(
         end_view(space, k, time, pose, place, direction, readings[k, 0])
     # Each reading of a sensor updates different rows.
     turn_of_rows = tick // numbers.round_ticks
-    see(space, turn_of_rows, pose, numbers.sectors, readings, error)
+    see(space, turn_of_rows, ROWS, pose, numbers.sectors, readings, error)
     if long:
-        see(space.fine, turn_of_rows, pose, numbers.sectors, readings, error)
+        see(space.fine, turn_of_rows, 1, pose, numbers.sectors, readings, error)
 
 
 @register_jitable
@@ -260,9 +261,8 @@ class FreeSpaceMap(Block):
         cells = parameters.cells_for(body_radius(robot))
         fine_cells = 0
         if numbers.outline.is_long:
-            fine_m = parameters.cell_m / PARTS
-            reach = checked_reach(parameters, robot, plant, tick_s)
-            fine_cells = 2 * math.ceil(reach / fine_m + MOST_SLACK + 2)
+            fine_m = (body_radius(robot) + _FINE_AHEAD_M) / (parameters.cell_m / PARTS)
+            fine_cells = 2 * (math.ceil(fine_m) + MOST_SLACK)
         space = make_free_space(
             cells, parameters.cell_m, sensors.count, points, fine_cells
         )

@@ -16,8 +16,8 @@ from systems.safety.views import Sectors, lasting
 register_jitable(lasting)
 
 #: A reading updates only one row of cells out of this number of rows. Later readings
-#: update the other rows.
-_ROWS = 4
+#: update the other rows. A reading updates all rows of fine cells.
+ROWS = 4
 #: A cell becomes free if the logarithm of its evidence reaches this limit. By Ville's
 #: inequality, noise alone does this with a probability of at most 2.9e-7, which is the
 #: probability that normally distributed noise exceeds 5 standard deviations.
@@ -31,6 +31,7 @@ _FULL_HIT_M = 0.6
 def see(
     space: FreeSpace | FineSpace,
     turn: int,
+    rows: int,
     pose: Any,
     sectors: Sectors,
     readings: Any,
@@ -59,8 +60,9 @@ def see(
 
     Args:
         space: Map of free space. The function changes the map in place.
-        turn: Number of the call. One call updates only every fourth row of cells. The
-            next call updates other rows.
+        turn: Number of the call.
+        rows: One call updates one row of cells out of this number of rows. The next
+            call updates other rows.
         pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
         readings: (sensors, 4) array with four distances per sensor, m. The sensor has
@@ -90,7 +92,7 @@ def see(
         low_i, low_j, high_i, high_j = cells_within(space, low_x, low_y, high_x, high_y)
         view = group_view(sectors, seen, begin, end, pose[2], half)
         sigma = np.max(seen[begin:end, 4])
-        for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
+        for i in range(low_i + (turn - low_i) % rows, high_i + 1, rows):
             dx = (i + 0.5) * cell - sx
             # The cells of the row that are not too far away.
             reach = math.sqrt(max((farthest + cell) ** 2 - dx * dx, 0.0))
