@@ -20,7 +20,7 @@ from systems.planning.following import CRUISE_SPEED_M_S
 from systems.planning.guarded_drive import drive_guarded
 from systems.planning.looks import HazardSensors
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.braking import SLOW_TURN_RAD_S
+from systems.safety.braking import CREEP_M_S
 from systems.safety.outline import Outline
 from systems.safety.parameters import GuardParameters
 from systems.safety.views import range_errors
@@ -139,7 +139,7 @@ class GuardedController(Block):
         # wide body, the difference is too small to risk a place where it cannot turn.
         disc, outline = body_radius(robot), Outline.of(robot)
         narrow = 0.5 * robot.width_m if robot.length_m > robot.width_m else disc
-        creep = _CREEP_SHARE * SLOW_TURN_RAD_S * disc if outline.is_long else 0.0
+        creep = _CREEP_SHARE * CREEP_M_S if outline.is_long else 0.0
         if outline.is_long:
             narrow -= guard.cell_m
         numbers = DriveNumbers(

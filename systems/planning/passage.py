@@ -50,6 +50,8 @@ _STEPS = 0.05, 0.005
 _PIECE_M, _FEW, _NO_WALL_M = 0.05, 0.25, 3.0
 #: Weight of the mean deviation of the walls from a straight line against the width.
 _STRAIGHT = 20.0
+#: Least share of the difference by which a map moves the axis.
+_LEAST_GAIN = 0.2
 # ``_CENTER_GAIN``: share of the difference by which a plan moves the axis in a passage.
 # ``_BESIDE_M``: distance from the body within which there is a passage, m.
 _CENTER_GAIN, _BESIDE_M = 0.3, 0.15
@@ -256,7 +258,7 @@ def fit_axis(
 def refine_axis(
     p: Passage, points: Any, most_m: float, half_width: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Moves the axis toward that of the present map, to the mean of all maps so far.
+    """Moves the axis toward that of the present map, at first to the mean of all maps.
 
     A map whose axis is farther beside than ``most_m``, m, does not count.
     """
@@ -265,7 +267,7 @@ def refine_axis(
     moved, share = math.hypot(p.middle[0] - x, p.middle[1] - y), 0.0
     if moved <= most_m and p.width_m[0] >= _NARROWEST * half_width:
         p.maps[0] += 1.0
-        share = 1.0 / p.maps[0]
+        share = max(1.0 / p.maps[0], _LEAST_GAIN)
     p.middle[0], p.middle[1] = x + share * (p.middle[0] - x), y + share * (p.middle[1] - y)
     p.axis[0] = axis + share * (p.axis[0] - axis)
     p.width_m[0] = width + share * (p.width_m[0] - width)

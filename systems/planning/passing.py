@@ -39,12 +39,17 @@ _BACK, _FARTHEST = 0.3, 4.0
 _TRIES = 6
 #: Time for which the guard holds the robot before it backs out, s.
 _PATIENCE_S = 1.0
-#: Angle to the axis at which a leaving robot begins to turn away, rad.
-_LEAVE_RAD = 0.05
+# Turn of a leaving robot over half of its length, rad: ``_LEAVE_RAD`` along the axis, and
+# a share of its angle to the axis more. With 1, the end of its rear would keep its
+# distance from the wall.
+_LEAVE_RAD, _LEAVE_SHARE = 0.004, 0.9
 #: Angle to the axis at which it has turned away, rad.
-_AWAY_RAD = 0.4
-#: While the robot passes, a map whose axis is farther beside does not count, m.
-_NEAR_M = 0.06
+_AWAY_RAD = 0.7
+# While the robot passes, a map whose axis is farther beside does not count.
+# ``_FAR_M``, ``_NEAR_M``: this distance far before the passage and near it, m.
+# ``_SURE``: distance of the front from the passage between both, as a multiple of half of
+#   the length.
+_FAR_M, _NEAR_M, _SURE = 0.2, 0.06, 1.2
 
 
 @register_jitable
@@ -75,6 +80,9 @@ def plan_passage(
             p.state[0] = OPEN
         else:
             p.state[0], state.memory.blocked_s[0] = PASSING, time
+            if front_error(p, pose, half_size[0])[0] < -p.half_m[0]:
+                p.maps[0] = 0.0
+                refine_axis(p, points, radius, half_size[1])
     if p.state[0] == PASSING and time - state.memory.blocked_s[0] > _PATIENCE_S:
         p.state[0], state.memory.blocked_s[0] = RETREATING, time
         p.failures[0] += 1.0
@@ -83,11 +91,14 @@ def plan_passage(
     if p.state[0] == PASSING:
         along, _ = front_error(p, pose, half_size[0])
         first, second = sides(points, pose[0], pose[1])
-        beyond = along - half_size[0] > -p.half_m[0]
+        beyond = along > half_size[0]
         if beyond and first + second >= 2.0 * radius:
             p.state[0] = LEAVING
         else:
-            if along < -p.half_m[0] - 0.5 * half_size[0]:
+            before = -p.half_m[0] - along
+            if before > _SURE * half_size[0]:
+                refine_axis(p, points, _FAR_M, half_size[1])
+            elif before > 0.0:
                 refine_axis(p, points, _NEAR_M, half_size[1])
             center_axis(p, space, pose, radius, half_size[1])
             return
@@ -145,8 +156,8 @@ def drive_in_passage(
     """
     half_length, radius = numbers.half_size[0], numbers.widths[1]
     if p.state[0] == LEAVING:
-        rate = (abs(wrapped(theta - p.axis[0])) + _LEAVE_RAD) / half_length
-        rate *= min(max(error / _LEAVE_RAD, -1.0), 1.0)
+        rate = _LEAVE_SHARE * abs(wrapped(theta - p.axis[0])) + _LEAVE_RAD
+        rate *= min(max(error, -1.0), 1.0) / half_length
         speed = numbers.creep_m_s / (1.0 + abs(rate) * radius)
         m.speed[0], m.turn[0] = speed, speed * rate
         return

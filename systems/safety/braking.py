@@ -22,6 +22,11 @@ _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 #: A robot that turns on the spot counts as at rest if its yaw rate is at most this
 #: value, rad/s.
 SLOW_TURN_RAD_S = 0.3
+#: A long body counts as at rest if no point of its disc is faster, m/s. It is the speed
+#: that ISO 3691-4 permits to driverless trucks which cannot detect persons.
+CREEP_M_S = 0.3
+#: Share of this speed to which a faster command is reduced.
+_ALMOST = 0.99
 #: A robot turns on the spot if two conditions hold. The commanded speed of the axle is
 #: below this number, m/s. The distance that the axle still moves due to the lag of the
 #: motors is below ``IN_PLACE_M``.
@@ -86,7 +91,8 @@ def can_be_braked(
     slow = in_place and turn <= SLOW_TURN_RAD_S
     # A long body that creeps counts as at rest, too.
     if not slow and _is_long(numbers):
-        slow = _sweep(commanded, numbers) <= 1.0 and _sweep(speeds, numbers) <= 1.0
+        slow = _fastest_point(commanded, numbers) <= CREEP_M_S
+        slow = slow and _fastest_point(speeds, numbers) <= CREEP_M_S
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
     begin, disc = pose, outline.radius_m + numbers.keep_m
     # Number of distances from ``gaps`` that separate a cell from the body.
@@ -150,17 +156,16 @@ def _is_long(numbers: BrakingNumbers) -> bool:
 
 
 @njit(cache=True)
-def _sweep(wheels: Any, numbers: BrakingNumbers) -> float:  # pragma: no cover
-    """Computes the speed of the fastest point of the disc.
+def _fastest_point(
+    wheels: Any, numbers: BrakingNumbers
+) -> float:  # pragma: no cover  (compiled)
+    """Computes the speed of the fastest point of the disc, m/s.
 
     ``wheels`` are the speeds of the left and right wheel, rad/s.
-
-    Returns:
-        Speed as a multiple of that in a turn on the spot which counts as rest.
     """
     radius, lever = numbers.wheel_radius_m, numbers.outline.radius_m
     turn = abs(wheels[1] - wheels[0]) * radius / numbers.wheel_separation_m
-    return (_ahead(wheels, radius) / lever + turn) / SLOW_TURN_RAD_S
+    return _ahead(wheels, radius) + turn * lever
 
 
 @njit(cache=True)
@@ -321,9 +326,9 @@ def chosen(
         part = share * wish[0], share * wish[1]
         if can_be_braked(pose, speeds, part, danger, numbers):
             return PASSED if number == 0 else SLOWED, part
-    sweep = _sweep(wish, numbers)
-    if numbers.obstacle_speed_m_s > 0.0 and sweep > 1.0 and _is_long(numbers):
-        share = 0.99 / sweep
+    fastest = _fastest_point(wish, numbers)
+    if numbers.obstacle_speed_m_s > 0.0 and fastest > CREEP_M_S and _is_long(numbers):
+        share = _ALMOST * CREEP_M_S / fastest
         part = share * wish[0], share * wish[1]
         if can_be_braked(pose, speeds, part, danger, numbers):
             return SLOWED, part
