@@ -161,7 +161,7 @@ def drive_guarded(
     if m.mode[0] == BACKING:
         back_off(m, time, pose, error, report)
     if m.mode[0] == DRIVING:
-        _drive(time, pose, velocity, wanted, error, there, state, numbers)
+        _drive(time, pose, report, velocity, wanted, error, there, state, numbers)
     _evade(time, pose, wanted, error, state, numbers)
 
 
@@ -203,7 +203,7 @@ def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untype
 
 @register_jitable
 def _drive(  # type: ignore[no-untyped-def]
-    time, pose, velocity, wanted, error, there, state, numbers
+    time, pose, report, velocity, wanted, error, there, state, numbers
 ):
     """Drives toward the carrot, which is a point of the route (``find_heading``).
 
@@ -215,7 +215,9 @@ def _drive(  # type: ignore[no-untyped-def]
     """
     m = state.memory
     if state.passage.state[0] >= PASSING:
-        drive_in_passage(m, state.passage, pose[2], wanted, error, numbers)
+        drive_in_passage(
+            m, state.passage, pose[2], wanted, error, report[1], numbers
+        )
         return
     if there and numbers.follow_distance_m < numbers.control_point_m:
         # This twist gives P the wanted velocity.

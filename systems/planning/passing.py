@@ -39,10 +39,14 @@ _BACK, _FARTHEST = 0.3, 4.0
 _TRIES = 6
 #: Time for which the guard holds the robot before it backs out, s.
 _PATIENCE_S = 1.0
-# Turn of a leaving robot over half of its length, rad: ``_LEAVE_RAD`` along the axis, and
-# a share of its angle to the axis more. With 1, the end of its rear would keep its
-# distance from the wall.
-_LEAVE_RAD, _LEAVE_SHARE = 0.004, 0.9
+# A leaving robot turns by a share of its angle to the axis in half of its length. With a
+# share of 1, the end of its rear keeps its distance from the wall. It also turns so that
+# it uses up its room at the wall.
+# ``_LEAVE_SHARE``: this share.
+# ``_LEAVE_M``: distance in which it would use up its room, m.
+# ``_MOST_ROOM_M``: largest room that counts, m.
+# ``_LEAVE_RAD``: heading error above which it turns as fast, rad.
+_LEAVE_SHARE, _LEAVE_M, _MOST_ROOM_M, _LEAVE_RAD = 0.9, 0.3, 0.1, 0.2
 #: Angle to the axis at which it has turned away, rad.
 _AWAY_RAD = 0.7
 # While the robot passes, a map whose axis is farther beside does not count.
@@ -80,9 +84,9 @@ def plan_passage(
             p.state[0] = OPEN
         else:
             p.state[0], state.memory.blocked_s[0] = PASSING, time
-            if front_error(p, pose, half_size[0])[0] < -p.half_m[0]:
+            if front_error(p, pose, half_size[0])[0] < half_size[0]:
                 p.maps[0] = 0.0
-                refine_axis(p, points, radius, half_size[1])
+                refine_axis(p, points, _FAR_M, half_size[1])
     if p.state[0] == PASSING and time - state.memory.blocked_s[0] > _PATIENCE_S:
         p.state[0], state.memory.blocked_s[0] = RETREATING, time
         p.failures[0] += 1.0
@@ -98,7 +102,7 @@ def plan_passage(
             before = -p.half_m[0] - along
             if before > _SURE * half_size[0]:
                 refine_axis(p, points, _FAR_M, half_size[1])
-            elif before > 0.0:
+            elif along < half_size[0]:
                 refine_axis(p, points, _NEAR_M, half_size[1])
             center_axis(p, space, pose, radius, half_size[1])
             return
@@ -145,6 +149,7 @@ def drive_in_passage(
     theta: float,
     wanted: float,
     error: float,
+    room_m: float,
     numbers: DriveNumbers,
 ) -> None:
     """Computes the twist of a robot that passes, backs out, or leaves.
@@ -156,8 +161,9 @@ def drive_in_passage(
     """
     half_length, radius = numbers.half_size[0], numbers.widths[1]
     if p.state[0] == LEAVING:
-        rate = _LEAVE_SHARE * abs(wrapped(theta - p.axis[0])) + _LEAVE_RAD
-        rate *= min(max(error, -1.0), 1.0) / half_length
+        room = min(max(room_m, 0.0), _MOST_ROOM_M) / _LEAVE_M
+        rate = (_LEAVE_SHARE * abs(wrapped(theta - p.axis[0])) + room) / half_length
+        rate *= min(max(error / _LEAVE_RAD, -1.0), 1.0)
         speed = numbers.creep_m_s / (1.0 + abs(rate) * radius)
         m.speed[0], m.turn[0] = speed, speed * rate
         return
