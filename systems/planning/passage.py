@@ -37,9 +37,9 @@ _LONGEST = 4.0
 _HITS = 3.0
 # ``_LINED_UP_RAD``: largest heading error at the begin of the passage, rad.
 # ``_LINED_UP``: largest distance from the axis there, as a multiple of the half width.
-_LINED_UP_RAD, _LINED_UP = 0.025, 0.03
+_LINED_UP_RAD, _LINED_UP = 0.015, 0.03
 #: Distance from the approach to the passage, as a multiple of half of the length.
-_APPROACH = 3.4
+_APPROACH = 3.8
 #: Directions from which the front may come to the approach, from the axis, rad.
 _SLANTS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.0, -1.0)
 #: Steps of the search for the axis: coarse and fine, rad.
@@ -143,8 +143,20 @@ def _in_window(fine: FineSpace, i: int, j: int) -> bool:
 
 
 @njit(cache=True)
-def sides(points: Any, x: float, y: float) -> Any:  # pragma: no cover  (compiled)
-    """Returns the distances of the nearest point and of the nearest one opposite, m."""
+def sides(
+    points: Any, x: float, y: float, opposite: float = -0.5
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Computes the distances of the nearest point and of the nearest one opposite, m.
+
+    Args:
+        points: (n, 2) positions of occupied cells, m.
+        x: Position from which the distances count, x, m.
+        y: Position, y, m.
+        opposite: Cosine of the least angle between the directions of both points.
+
+    Returns:
+        Two distances, m, infinite without such a point.
+    """
     first, at = np.inf, -1
     for k in range(len(points)):
         distance = math.hypot(points[k, 0] - x, points[k, 1] - y)
@@ -156,7 +168,7 @@ def sides(points: Any, x: float, y: float) -> Any:  # pragma: no cover  (compile
         for k in range(len(points)):
             dx, dy = points[k, 0] - x, points[k, 1] - y
             distance = math.hypot(dx, dy)
-            if distance < second and ux * dx + uy * dy < -0.5 * first * distance:
+            if distance < second and ux * dx + uy * dy < opposite * first * distance:
                 second = distance
     return first, second
 

@@ -39,6 +39,9 @@ _BACK, _FARTHEST = 0.3, 4.0
 _TRIES = 6
 #: Time for which the guard holds the robot before it backs out, s.
 _PATIENCE_S = 1.0
+#: A passage ends where, from the axle, no wall is opposite of the nearest one. This is the
+#: cosine of the least angle between both.
+_BESIDE = -0.9
 # A leaving robot turns by a share of its angle to the axis in half of its length. With a
 # share of 1, the end of its rear keeps its distance from the wall. It also turns so that
 # it uses up its room at the wall.
@@ -46,7 +49,7 @@ _PATIENCE_S = 1.0
 # ``_LEAVE_M``: distance in which it would use up its room, m.
 # ``_MOST_ROOM_M``: largest room that counts, m.
 # ``_LEAVE_RAD``: heading error above which it turns as fast, rad.
-_LEAVE_SHARE, _LEAVE_M, _MOST_ROOM_M, _LEAVE_RAD = 0.9, 0.3, 0.1, 0.2
+_LEAVE_SHARE, _LEAVE_M, _MOST_ROOM_M, _LEAVE_RAD = 1.0, 0.2, 0.1, 0.2
 #: Angle to the axis at which it has turned away, rad.
 _AWAY_RAD = 0.7
 # While the robot passes, a map whose axis is farther beside does not count.
@@ -94,7 +97,7 @@ def plan_passage(
         return
     if p.state[0] == PASSING:
         along, _ = front_error(p, pose, half_size[0])
-        first, second = sides(points, pose[0], pose[1])
+        first, second = sides(points, pose[0], pose[1], _BESIDE)
         beyond = along > half_size[0]
         if beyond and first + second >= 2.0 * radius:
             p.state[0] = LEAVING
