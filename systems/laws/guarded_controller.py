@@ -40,7 +40,7 @@ def guarded_step(
     drive_guarded(tick, state, inputs, numbers)
     memory, (twist, plan, gives_up) = state.memory, outputs
     twist[0], twist[1] = memory.speed[0], memory.turn[0]
-    plan[0], plan[1] = memory.mode[0] + 10 * state.passage.state[0], memory.carrot[0]
+    plan[0], plan[1] = memory.mode[0], memory.carrot[0]
     plan[2], plan[3] = memory.carrot[1], memory.way_left_m[0]
     gives_up[0] = 1.0 if memory.mode[0] == GIVING_UP else 0.0
 

@@ -79,6 +79,9 @@ def plan_passage(
     if p.state[0] >= PASSING:
         state.memory.passable_s[0] = time
     if p.state[0] == RETREATING:
+        if front_error(p, pose, half_size[0])[0] < half_size[0]:
+            p.maps[0] = 0.0
+            refine_axis(p, points, _FAR_M, half_size[1])
         if not _has_backed(time, pose, state, half_size):
             return
         if p.failures[0] >= _TRIES:
@@ -87,9 +90,6 @@ def plan_passage(
             p.state[0] = OPEN
         else:
             p.state[0], state.memory.blocked_s[0] = PASSING, time
-            if front_error(p, pose, half_size[0])[0] < half_size[0]:
-                p.maps[0] = 0.0
-                refine_axis(p, points, _FAR_M, half_size[1])
     if p.state[0] == PASSING and time - state.memory.blocked_s[0] > _PATIENCE_S:
         p.state[0], state.memory.blocked_s[0] = RETREATING, time
         p.failures[0] += 1.0
@@ -137,8 +137,8 @@ def _has_backed(time: float, pose: Any, state: DriveState, half_size: Any) -> bo
     along, _ = front_error(p, pose, half_size[0])
     if p.failures[0] >= _TRIES:
         back = _FARTHEST
-    # A robot that has not entered yet may line up better from farther away.
-    elif along < -p.half_m[0] and not lines_up(p, pose, half_size):
+    # Before the middle, the robot may line up better from farther away.
+    elif along < half_size[0] and not lines_up(p, pose, half_size):
         back = _FARTHEST
     if time - state.memory.blocked_s[0] > _PATIENCE_S:
         return True
@@ -171,7 +171,7 @@ def drive_in_passage(
         m.speed[0], m.turn[0] = speed, speed * rate
         return
     if abs(error) > TURN_FIRST_RAD:
-        m.speed[0], m.turn[0] = 0.0, turn_rate(error)
+        m.speed[0], m.turn[0] = 0.0, turn_rate(wrapped(p.axis[0] - theta))
         return
     ahead, rate = math.cos(error), math.sin(error) / half_length
     speed = math.copysign(numbers.creep_m_s, wanted) / (ahead + abs(rate) * radius)

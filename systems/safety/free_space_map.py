@@ -40,7 +40,7 @@ from systems.safety.views import (
 #: Largest angle between two points of a sensor's arc, seen from the sensor, rad.
 _ARC_STEP = 0.035
 #: Distance from the disc around a long body up to which there are fine cells, m.
-_FINE_AHEAD_M = 0.6
+_FINE_AHEAD_M = 0.9
 
 
 class MapNumbers(NamedTuple):
