@@ -12,8 +12,8 @@ from systems.planning.carrot import find_carrot
 from systems.planning.drive_state import DriveNumbers, DriveState
 from systems.planning.following import APPROACH_GAIN, wanted_speed
 from systems.planning.hazards import find_movers
-from systems.planning.passage import APPROACHING, PASSING, RETREATING, along_axis
-from systems.planning.passing import plan_passage
+from systems.planning.passage import APPROACHING, PASSING, RETREATING
+from systems.planning.passing import heading_in_passage, plan_passage
 from systems.planning.turning import wrapped
 from systems.planning.way import OCCUPIED, TIGHT, find_way
 from systems.safety.free_space import FreeSpace
@@ -92,9 +92,7 @@ def find_heading(
     p = state.passage
     if p.state[0] == PASSING or p.state[0] == RETREATING:
         m.carrot[0], m.carrot[1] = p.middle
-        if p.state[0] == RETREATING:
-            return -numbers.creep_m_s, 0.0, False
-        return numbers.creep_m_s, along_axis(p, pose, numbers.half_size[0]), False
+        return *heading_in_passage(p, pose, numbers), False
     carrot = find_carrot(way, x, y, LOOK_AHEAD_M)
     # Distance from P to the target, and from the axle.
     follow, offset = numbers.follow_distance_m, numbers.control_point_m

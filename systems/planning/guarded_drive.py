@@ -160,8 +160,11 @@ def drive_guarded(
         begin_backing(m, time)
     if m.mode[0] == BACKING:
         back_off(m, time, pose, error, report)
-    if m.mode[0] == DRIVING:
-        _drive(time, pose, report, velocity, wanted, error, there, state, numbers)
+    if m.mode[0] == DRIVING and passing:
+        p, theta = state.passage, pose[2]
+        drive_in_passage(m, p, theta, wanted, error, report[1], numbers)
+    elif m.mode[0] == DRIVING:
+        _drive(time, velocity, wanted, error, there, state, numbers)
     _evade(time, pose, wanted, error, state, numbers)
 
 
@@ -203,7 +206,7 @@ def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untype
 
 @register_jitable
 def _drive(  # type: ignore[no-untyped-def]
-    time, pose, report, velocity, wanted, error, there, state, numbers
+    time, velocity, wanted, error, there, state, numbers
 ):
     """Drives toward the carrot, which is a point of the route (``find_heading``).
 
@@ -214,11 +217,6 @@ def _drive(  # type: ignore[no-untyped-def]
     error is large, the robot turns without driving.
     """
     m = state.memory
-    if state.passage.state[0] >= PASSING:
-        drive_in_passage(
-            m, state.passage, pose[2], wanted, error, report[1], numbers
-        )
-        return
     if there and numbers.follow_distance_m < numbers.control_point_m:
         # This twist gives P the wanted velocity.
         m.speed[0] = wanted * math.cos(error)

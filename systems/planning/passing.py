@@ -9,19 +9,20 @@ from numba.extending import register_jitable
 
 from systems.planning.drive_state import DriveMemory, DriveNumbers, DriveState
 from systems.planning.passage import (
-    APPROACHING,
     LEAVING,
     OPEN,
     PASSING,
     RETREATING,
     Passage,
-    center_axis,
-    find_passage,
+    along_axis,
     front_error,
     lines_up,
+)
+from systems.planning.passage_axis import center_axis, refine_axis
+from systems.planning.passage_search import (
+    find_passage,
     occupied_points,
     place_approach,
-    refine_axis,
     sides,
 )
 from systems.planning.turning import TURN_FIRST_RAD, turn_rate, wrapped
@@ -39,12 +40,12 @@ _BACK, _FARTHEST = 0.3, 4.0
 _TRIES = 6
 #: Time for which the guard holds the robot before it backs out, s.
 _PATIENCE_S = 1.0
-#: A passage ends where, from the axle, no wall is opposite of the nearest one. This is the
+#: A passage ends where no wall is opposite of the one nearest to the axle. This is the
 #: cosine of the least angle between both.
 _BESIDE = -0.9
-# A leaving robot turns by a share of its angle to the axis in half of its length. With a
-# share of 1, the end of its rear keeps its distance from the wall. It also turns so that
-# it uses up its room at the wall.
+# A leaving robot turns by a share of its angle to the axis in half of its length. With
+# a share of 1, the end of its rear keeps its distance from the wall. The robot also
+# turns so that it uses up its room at the wall.
 # ``_LEAVE_SHARE``: this share.
 # ``_LEAVE_M``: distance in which it would use up its room, m.
 # ``_MOST_ROOM_M``: largest room that counts, m.
@@ -54,8 +55,8 @@ _LEAVE_SHARE, _LEAVE_M, _MOST_ROOM_M, _LEAVE_RAD = 1.0, 0.2, 0.1, 0.2
 _AWAY_RAD = 0.7
 # While the robot passes, a map whose axis is farther beside does not count.
 # ``_FAR_M``, ``_NEAR_M``: this distance far before the passage and near it, m.
-# ``_SURE``: distance of the front from the passage between both, as a multiple of half of
-#   the length.
+# ``_SURE``: distance of the front from the passage between both, as a multiple of half
+#   of the length.
 _FAR_M, _NEAR_M, _SURE = 0.2, 0.06, 1.2
 
 
@@ -79,41 +80,15 @@ def plan_passage(
     if p.state[0] >= PASSING:
         state.memory.passable_s[0] = time
     if p.state[0] == RETREATING:
-        if front_error(p, pose, half_size[0])[0] < half_size[0]:
-            p.maps[0] = 0.0
-            refine_axis(p, points, _FAR_M, half_size[1])
-        if not _has_backed(time, pose, state, half_size):
-            return
-        if p.failures[0] >= _TRIES:
-            place = p.middle[0], p.middle[1]
-            mark_blocked(state.way, place, time + MARK_S)
-            p.state[0] = OPEN
-        else:
-            p.state[0], state.memory.blocked_s[0] = PASSING, time
-    if p.state[0] == PASSING and time - state.memory.blocked_s[0] > _PATIENCE_S:
-        p.state[0], state.memory.blocked_s[0] = RETREATING, time
-        p.failures[0] += 1.0
-        p.backed_from[0], _ = front_error(p, pose, half_size[0])
-        return
-    if p.state[0] == PASSING:
-        along, _ = front_error(p, pose, half_size[0])
-        first, second = sides(points, pose[0], pose[1], _BESIDE)
-        beyond = along > half_size[0]
-        if beyond and first + second >= 2.0 * radius:
-            p.state[0] = LEAVING
-        else:
-            before = -p.half_m[0] - along
-            if before > _SURE * half_size[0]:
-                refine_axis(p, points, _FAR_M, half_size[1])
-            elif along < half_size[0]:
-                refine_axis(p, points, _NEAR_M, half_size[1])
-            center_axis(p, space, pose, radius, half_size[1])
-            return
+        _plan_retreat(time, pose, state, points, half_size)
+    elif p.state[0] == PASSING:
+        _plan_passing(time, pose, state, points, space, numbers)
     if p.state[0] == LEAVING:
         angle = abs(wrapped(pose[2] - p.axis[0]))
-        if angle < _AWAY_RAD and sides(points, pose[0], pose[1])[0] < radius:
-            return
-        p.state[0] = OPEN
+        if angle > _AWAY_RAD or sides(points, pose[0], pose[1])[0] >= radius:
+            p.state[0] = OPEN
+    if p.state[0] >= PASSING:
+        return
     if p.state[0] == OPEN:
         find_passage(p, state.way, points, radius, half_size)
         if p.state[0] == OPEN:
@@ -131,18 +106,61 @@ def plan_passage(
 
 
 @register_jitable
-def _has_backed(time: float, pose: Any, state: DriveState, half_size: Any) -> bool:
-    """Checks whether a robot that backs out is far enough for another try."""
+def _plan_passing(  # type: ignore[no-untyped-def]
+    time, pose, state, points, space, numbers
+):
+    """Adapts the axis, and decides whether the robot has passed or has to back out."""
+    p, half_size, radius = state.passage, numbers.half_size, numbers.widths[1]
+    along, _ = front_error(p, pose, half_size[0])
+    if time - state.memory.blocked_s[0] > _PATIENCE_S:
+        p.state[0], state.memory.blocked_s[0] = RETREATING, time
+        p.failures[0] += 1.0
+        p.backed_from[0] = along
+        return
+    first, second = sides(points, pose[0], pose[1], _BESIDE)
+    if along > half_size[0] and first + second >= 2.0 * radius:
+        p.state[0] = LEAVING
+        return
+    if along < -p.half_m[0] - _SURE * half_size[0]:
+        refine_axis(p, points, _FAR_M, half_size[1])
+    elif along < half_size[0]:
+        refine_axis(p, points, _NEAR_M, half_size[1])
+    center_axis(p, space, pose, radius, half_size[1])
+
+
+@register_jitable
+def _plan_retreat(  # type: ignore[no-untyped-def]
+    time, pose, state, points, half_size
+):
+    """Adapts the axis, and decides whether the robot tries again or gives up."""
     p, back = state.passage, _BACK
     along, _ = front_error(p, pose, half_size[0])
-    if p.failures[0] >= _TRIES:
-        back = _FARTHEST
+    entering = along < half_size[0]
+    if entering:
+        p.maps[0] = 0.0
+        refine_axis(p, points, _FAR_M, half_size[1])
     # Before the middle, the robot may line up better from farther away.
-    elif along < half_size[0] and not lines_up(p, pose, half_size):
+    last = p.failures[0] >= _TRIES
+    if last or (entering and not lines_up(p, pose, half_size)):
         back = _FARTHEST
-    if time - state.memory.blocked_s[0] > _PATIENCE_S:
-        return True
-    return along < p.backed_from[0] - back * half_size[0]
+    held = time - state.memory.blocked_s[0] > _PATIENCE_S
+    if not held and along >= p.backed_from[0] - back * half_size[0]:
+        return
+    p.state[0], state.memory.blocked_s[0] = PASSING, time
+    if last:
+        place = p.middle[0], p.middle[1]
+        mark_blocked(state.way, place, time + MARK_S)
+        p.state[0] = OPEN
+
+
+@register_jitable
+def heading_in_passage(
+    p: Passage, pose: Any, numbers: DriveNumbers
+) -> tuple[float, float]:
+    """Computes the wanted speed, m/s, and the heading error, rad, on the axis."""
+    if p.state[0] == RETREATING:
+        return -numbers.creep_m_s, 0.0
+    return numbers.creep_m_s, along_axis(p, pose, numbers.half_size[0])
 
 
 @register_jitable

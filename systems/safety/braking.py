@@ -87,12 +87,7 @@ def can_be_braked(
     # From a cell that is not free, the way out is unknown.
     if danger.distance_m == -np.inf and not in_place:
         return False
-    turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
-    slow = in_place and turn <= SLOW_TURN_RAD_S
-    # A long body that creeps counts as at rest, too.
-    if not slow and _is_long(numbers):
-        slow = _fastest_point(commanded, numbers) <= CREEP_M_S
-        slow = slow and _fastest_point(speeds, numbers) <= CREEP_M_S
+    slow = _counts_as_rest(speeds, commanded, in_place, numbers)
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
     begin, disc = pose, outline.radius_m + numbers.keep_m
     # Number of distances from ``gaps`` that separate a cell from the body.
@@ -146,6 +141,18 @@ def can_be_braked(
             return True
         if parts % numbers.parts == 0:
             commanded = braked(commanded, numbers)
+
+
+@register_jitable
+def _counts_as_rest(
+    speeds: Any, commanded: Any, in_place: Any, numbers: BrakingNumbers
+) -> bool:
+    """Checks whether the robot is so slow that moving obstacles do not matter."""
+    turn = abs(commanded[1] - commanded[0]) * numbers.wheel_radius_m
+    if in_place and turn / numbers.wheel_separation_m <= SLOW_TURN_RAD_S:
+        return True
+    fastest = max(_fastest_point(commanded, numbers), _fastest_point(speeds, numbers))
+    return _is_long(numbers) and fastest <= CREEP_M_S
 
 
 @register_jitable

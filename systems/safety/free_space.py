@@ -142,7 +142,11 @@ def cell_is_free(
 
 @njit(cache=True)
 def cells_within(
-    space: FreeSpace | FineSpace, low_x: float, low_y: float, high_x: float, high_y: float
+    space: FreeSpace | FineSpace,
+    low_x: float,
+    low_y: float,
+    high_x: float,
+    high_y: float,
 ) -> tuple[int, int, int, int]:  # pragma: no cover  (compiled)
     """Finds the cells of the window that a rectangle meets.
 
@@ -318,7 +322,12 @@ def edge_cells(
 
 @njit(cache=True)
 def free_cells(
-    space: FreeSpace | FineSpace, low_i: int, low_j: int, high_i: int, high_j: int, until: float
+    space: FreeSpace | FineSpace,
+    low_i: int,
+    low_j: int,
+    high_i: int,
+    high_j: int,
+    until: float,
 ) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
     """Returns ``cell_is_free`` for all cells of a rectangle."""
     cells = space.free_until.shape[0]
