@@ -27,7 +27,7 @@ from systems.safety.free_space import (
 )
 from systems.safety.outline import Outline
 from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
-from systems.safety.seen_cells import ROWS, end_view, see
+from systems.safety.seen_cells import end_view, see
 from systems.safety.views import (
     RANGE_MARGIN_M,
     PlaceError,
@@ -145,9 +145,9 @@ def map_step(
         end_view(space, k, time, pose, place, direction, readings[k, 0])
     # Each reading of a sensor updates different rows.
     turn_of_rows = tick // numbers.round_ticks
-    see(space, turn_of_rows, ROWS, pose, numbers.sectors, readings, error)
+    see(space, turn_of_rows, pose, numbers.sectors, readings, error)
     if long:
-        see(space.fine, turn_of_rows, 1, pose, numbers.sectors, readings, error)
+        see(space.fine, turn_of_rows, pose, numbers.sectors, readings, error, 1)
 
 
 @register_jitable

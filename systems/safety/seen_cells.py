@@ -17,7 +17,7 @@ register_jitable(lasting)
 
 #: A reading updates only one row of cells out of this number of rows. Later readings
 #: update the other rows. A reading updates all rows of fine cells.
-ROWS = 4
+_ROWS = 4
 #: A cell becomes free if the logarithm of its evidence reaches this limit. By Ville's
 #: inequality, noise alone does this with a probability of at most 2.9e-7, which is the
 #: probability that normally distributed noise exceeds 5 standard deviations.
@@ -31,11 +31,11 @@ _FULL_HIT_M = 0.6
 def see(
     space: FreeSpace | FineSpace,
     turn: int,
-    rows: int,
     pose: Any,
     sectors: Sectors,
     readings: Any,
     error: Any,
+    rows: int = _ROWS,
 ) -> None:  # pragma: no cover  (compiled)
     """Enters the newest readings of the sensors into the map of free space.
 
@@ -61,8 +61,6 @@ def see(
     Args:
         space: Map of free space. The function changes the map in place.
         turn: Number of the call.
-        rows: One call updates one row of cells out of this number of rows. The next
-            call updates other rows.
         pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
         readings: (sensors, 4) array with four distances per sensor, m. The sensor has
@@ -71,6 +69,8 @@ def see(
             is the reading less all errors but noise, minus infinity without a reading.
             The fourth is the standard deviation of the noise.
         error: Errors that limit how long a cell stays free.
+        rows: One call updates one row of cells out of this number of rows. The next
+            call updates other rows.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
     # Radius of the circle around a cell.
