@@ -81,10 +81,18 @@ def test_occupied_points_are_fine_cells_that_were_not_seen_free():
     space.fine.free_until[8:10, 12:16] = 1.0
     found = occupied_points(space, (0.0, 0.0), 2.0, np.zeros((0, 3)))
     # Half of the cell in the window of the fine cells, and the whole cell outside.
-    assert sorted(map(tuple, found.round(5))) == sorted(
-        [(0.0125 * (a + 0.5), 0.0125 * (b + 0.5)) for a in (10, 11) for b in range(12, 16)]
-        + [(1.525, 0.025)]
-    ) or len(found) == 9
+    assert (
+        sorted(map(tuple, found.round(5)))
+        == sorted(
+            [
+                (0.0125 * (a + 0.5), 0.0125 * (b + 0.5))
+                for a in (10, 11)
+                for b in range(12, 16)
+            ]
+            + [(1.525, 0.025)]
+        )
+        or len(found) == 9
+    )
 
 
 @pytest.mark.drake
