@@ -37,7 +37,7 @@ _SHORT, _FARTHER = 3, 5
 _TURN_RAD, _STEP_RAD, _FINE_TURN_RAD, _FINE_STEP_RAD = 0.8, 0.05, 0.06, 0.005
 #: Width of a passage, as a multiple of the body's width, from which the robot need not
 #: line up.
-_WIDEST = 1.35
+_WIDEST = 1.5
 #: Directions from which the front may come to the axis, relative to the axis, rad.
 _SLANTS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.0, -1.0)
 # ``_ENOUGH_M``: distance of the disc from the nearest wall that is enough, m.

@@ -81,33 +81,29 @@ def test_occupied_points_are_fine_cells_that_were_not_seen_free():
     space.fine.free_until[8:10, 12:16] = 1.0
     found = occupied_points(space, (0.0, 0.0), 2.0, np.zeros((0, 3)))
     # Half of the cell in the window of the fine cells, and the whole cell outside.
-    assert (
-        sorted(map(tuple, found.round(5)))
-        == sorted(
-            [
-                (0.0125 * (a + 0.5), 0.0125 * (b + 0.5))
-                for a in (10, 11)
-                for b in range(12, 16)
-            ]
-            + [(1.525, 0.025)]
-        )
-        or len(found) == 9
-    )
+    fine = {
+        (0.0125 * (a + 0.5), 0.0125 * (b + 0.5))
+        for a in (10, 11)
+        for b in range(12, 16)
+    }
+    assert {tuple(point) for point in found.round(6)} == {
+        *((round(x, 6), round(y, 6)) for x, y in fine),
+        (1.525, 0.025),
+    }
 
 
 @pytest.mark.drake
-@pytest.mark.parametrize("speed", [0.0, 0.6])
-def test_a_long_body_passes_a_gap_that_is_narrower_than_its_disc(speed):
+def test_a_long_body_passes_a_gap_that_is_narrower_than_its_disc():
     """The gap is 0.75 m wide, the body 0.6 m, and its disc 1.34 m."""
+    wall = {"size_m": [1.0, 20.0]}
     scenario = load_scenario(
         "default",
         {
-            "name": "gap",
             "law": "guarded",
             "engine": "compiled",
             "hearing": "ideal_always",
             "duration_s": 60.0,
-            "arena_m": [12.0, 12.0],
+            "arena_m": [50.0, 50.0],
             "start": {"position_m": [-4.0, 1.0], "heading_deg": 0.0},
             "robot": {
                 "length_m": 1.2,
@@ -121,12 +117,11 @@ def test_a_long_body_passes_a_gap_that_is_narrower_than_its_disc(speed):
             "source": {"waypoints_m": [[4.5, 0.0]], "length_m": 0.02, "width_m": 0.02},
             "attraction": {"follow_distance_m": 0.3},
             "obstacles": [
-                {"name": "a", "waypoints_m": [[0.5, 3.375]], "size_m": [1.0, 6.0]},
-                {"name": "b", "waypoints_m": [[0.5, -3.375]], "size_m": [1.0, 6.0]},
+                {"name": "left", "waypoints_m": [[0.5, 10.375]], **wall},
+                {"name": "right", "waypoints_m": [[0.5, -10.375]], **wall},
             ],
-            "laws": {"guarded": {"obstacle_speed_m_s": speed}},
         },
     )
-    result = simulate(scenario)
-    assert result.metrics["ending"] == "reached"
-    assert 0.05 < result.metrics["min_clearance_m"] < 0.075
+    metrics = simulate(scenario).metrics
+    assert metrics["time_to_goal_s"] < 60.0
+    assert 0.05 < metrics["minimum_obstacle_clearance_m"] < 0.075
