@@ -71,6 +71,9 @@ class GuardedController(Block):
     - If every route of the last 20 s crossed cells with echoes, the robot stops. The
       port ``gives_up`` is then 1 until there is a route without such cells.
 
+    A long body lines up with passages that are narrower than its disc, and creeps
+    through them (``systems.planning.passing``).
+
     The block also tracks moving bodies (``systems.planning.hazards``). An echo from
     floor that was free before counts as a moving body. While such a body may come near,
     the block compares several pairs of speed and heading. It chooses the pair with the
@@ -139,9 +142,10 @@ class GuardedController(Block):
         # wide body, the difference is too small to risk a place where it cannot turn.
         disc, outline = body_radius(robot), Outline.of(robot)
         narrow = 0.5 * robot.width_m if robot.length_m > robot.width_m else disc
-        creep = _CREEP_SHARE * CREEP_M_S if outline.is_long else 0.0
+        creep = 0.0
         if outline.is_long:
-            narrow -= guard.cell_m
+            # Echoes seem to come from up to one cell in front of a wall.
+            creep, narrow = _CREEP_SHARE * CREEP_M_S, narrow - guard.cell_m
         numbers = DriveNumbers(
             attraction.follow_distance_m,
             robot.control_point_m,

@@ -85,7 +85,8 @@ class DriveNumbers(NamedTuple):
     widths: tuple[float, float]
     """Distances that routes keep from occupied cells, m: half of the width of the body
     plus margins, and the radius of the disc around the body plus the same margins. In
-    narrow passages, only the first distance is kept.
+    narrow passages, only the first distance is kept. For a long body, it is one cell of
+    the map less.
     """
     cruise_m_s: float
     """Largest wanted speed, m/s."""

@@ -66,7 +66,7 @@ def can_be_braked(
     ``obstacle_speed_m_s``. Then the disc around the axle that contains the body must
     stay ``keep_m`` away from all points that these obstacles may reach, or the robot
     must withdraw from the end of the view. A slow turn on the spot counts as rest and
-    needs no such check.
+    needs no such check, and so does a long body that creeps (``CREEP_M_S``).
 
     Args:
         pose: Present pose (x, y, theta), m and rad.
@@ -309,7 +309,8 @@ def chosen(
 
     The function returns the first of these commands that ``can_be_braked`` permits:
 
-    1. the wanted wheel speeds, then smaller shares of them along the same curve
+    1. the wanted wheel speeds, then smaller shares of them along the same curve; with
+       moving obstacles and a long body, also the share with which it creeps
     2. the wanted turn, while the forward motion brakes
     3. the same turn, but slow enough to count as rest
     4. the wanted forward motion without the turn

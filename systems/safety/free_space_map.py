@@ -192,6 +192,9 @@ class FreeSpaceMap(Block):
     count whole pulses, and the travel of each wheel has the relative error
     ``wheel_error``.
 
+    Around a long body (``Outline.is_long``), each cell consists of smaller fine cells.
+    They become free by the same rule, and each reading updates all of them.
+
     At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
     free. The outline of the body always counts as free. While the disc around the axle
     that contains the outline is free, its cells are not forgotten.
