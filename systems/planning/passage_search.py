@@ -35,9 +35,6 @@ _SHORT, _FARTHER = 3, 5
 # Searches for the axis of a new passage: first ``_TURN_RAD`` to both sides in steps of
 # ``_STEP_RAD``, then ``_FINE_TURN_RAD`` in steps of ``_FINE_STEP_RAD``.
 _TURN_RAD, _STEP_RAD, _FINE_TURN_RAD, _FINE_STEP_RAD = 0.8, 0.05, 0.06, 0.005
-#: Width of a passage, as a multiple of the body's width, from which the robot need not
-#: line up.
-_WIDEST = 1.5
 #: Directions from which the front may come to the axis, relative to the axis, rad.
 _SLANTS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.0, -1.0)
 # ``_ENOUGH_M``: distance of the disc from the nearest wall that is enough, m.
@@ -189,8 +186,7 @@ def find_passage(
     for _ in range(2):
         fit_axis(p, points, _TURN_RAD, _STEP_RAD)
     fit_axis(p, points, _FINE_TURN_RAD, _FINE_STEP_RAD)
-    width = 0.5 * p.width_m[0] / half_size[1]
-    if width < 0.5 * NARROWEST or width >= _WIDEST:
+    if p.width_m[0] < NARROWEST * half_size[1] or p.width_m[0] >= 2.0 * radius:
         return
     p.state[0], p.failures[0] = APPROACHING, 0.0
     place_approach(p, points, radius, half_size[0])

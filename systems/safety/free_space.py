@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,10 @@ from systems.safety.outline import Outline, frame_at, in_body
 
 #: Value of a cell that was never seen free.
 NEVER = -1.0
+_Values: TypeAlias = NDArray[np.float64]
+_Window: TypeAlias = tuple[
+    _Values, _Values, _Values, _Values, NDArray[np.int64], _Values
+]
 #: Number of fine cells along the side of a cell.
 PARTS = 4
 #: The window moves when its middle is farther from the robot than this number of cells.
@@ -103,7 +107,7 @@ def make_free_space(
     )
 
 
-def _window(cells: int) -> tuple[Any, ...]:
+def _window(cells: int) -> _Window:
     """Makes the first six fields of a map."""
     return (
         np.full((cells, cells), NEVER),
