@@ -20,6 +20,8 @@ from systems.planning.following import CRUISE_SPEED_M_S
 from systems.planning.guarded_drive import drive_guarded
 from systems.planning.looks import HazardSensors
 from systems.ranging.parameters import UltrasonicParameters
+from systems.safety.braking import CREEP_M_S
+from systems.safety.outline import Outline
 from systems.safety.parameters import GuardParameters
 from systems.safety.views import range_errors
 
@@ -27,6 +29,8 @@ from systems.safety.views import range_errors
 _CLEARANCE_M = 0.02
 #: Share of the top speed at which a fast robot drives. The rest is left for turns.
 _CRUISE_SHARE = 0.86
+#: Share of the largest speed that counts as rest at which a long body passes.
+_CREEP_SHARE = 0.96
 
 
 def guarded_step(
@@ -66,6 +70,9 @@ class GuardedController(Block):
     - If the guard stops the robot near a target at rest, the robot rests there.
     - If every route of the last 20 s crossed cells with echoes, the robot stops. The
       port ``gives_up`` is then 1 until there is a route without such cells.
+
+    A long body lines up with passages that are narrower than its disc, and creeps
+    through them (``systems.planning.passing``).
 
     The block also tracks moving bodies (``systems.planning.hazards``). An echo from
     floor that was free before counts as a moving body. While such a body may come near,
@@ -133,8 +140,12 @@ class GuardedController(Block):
         margin = guard.place_error_m + _CLEARANCE_M
         # In a passage, a body that is longer than wide is narrower than its disc. For a
         # wide body, the difference is too small to risk a place where it cannot turn.
-        disc = body_radius(robot)
+        disc, outline = body_radius(robot), Outline.of(robot)
         narrow = 0.5 * robot.width_m if robot.length_m > robot.width_m else disc
+        creep = 0.0
+        if outline.is_long:
+            # Echoes seem to come from up to one cell in front of a wall.
+            creep, narrow = _CREEP_SHARE * CREEP_M_S, narrow - guard.cell_m
         numbers = DriveNumbers(
             attraction.follow_distance_m,
             robot.control_point_m,
@@ -143,6 +154,7 @@ class GuardedController(Block):
             (narrow + margin, disc + margin),
             cruise_speed(robot),
             tick_s,
+            creep,
         )
         state = make_drive_state(guard.cells_for(disc), sensors.count)
         self.declare(

@@ -10,8 +10,10 @@ from numba.extending import register_jitable
 
 from systems.planning.carrot import find_carrot
 from systems.planning.drive_state import DriveNumbers, DriveState
-from systems.planning.following import wanted_speed
+from systems.planning.following import APPROACH_GAIN, wanted_speed
 from systems.planning.hazards import find_movers
+from systems.planning.passage import APPROACHING, PASSING, RETREATING
+from systems.planning.passing import heading_in_passage, plan_passage
 from systems.planning.turning import wrapped
 from systems.planning.way import OCCUPIED, TIGHT, find_way
 from systems.safety.free_space import FreeSpace
@@ -82,9 +84,15 @@ def find_heading(
         clear[0, 0], clear[0, 1], clear[0, 2] = *goal, _SOURCE_CLEARANCE_M
         count = 1 + find_movers(hazards, time, clear[1:])
         find_way(way, space, (x, y), goal, time, numbers.widths, clear[:count])
+        if numbers.creep_m_s > 0.0:
+            plan_passage(time, pose, state, space, clear[:count], numbers)
         m.planned_s[0] = time
         if way.dearest[0] < OCCUPIED:
             m.passable_s[0] = time
+    p = state.passage
+    if p.state[0] == PASSING or p.state[0] == RETREATING:
+        m.carrot[0], m.carrot[1] = p.middle
+        return *heading_in_passage(p, pose, numbers), False
     carrot = find_carrot(way, x, y, LOOK_AHEAD_M)
     # Distance from P to the target, and from the axle.
     follow, offset = numbers.follow_distance_m, numbers.control_point_m
@@ -105,6 +113,10 @@ def find_heading(
     wanted = wanted_speed(left - follow, along, numbers.cruise_m_s)
     rests = math.hypot(velocity[0], velocity[1]) < RESTS_M_S
     m.carrot[0], m.carrot[1], m.way_left_m[0] = carrot[0], carrot[1], left
+    if state.passage.state[0] == APPROACHING:
+        px, py = state.passage.approach
+        left = math.hypot(px - x, py - y)
+        return min(APPROACH_GAIN * left + 0.1, wanted), wrapped(bearing - theta), False
     there = rests and abs(left - follow) < _THERE_M
     if follow < offset:
         # No body is at the target. Beside it, the bearing from the axle says little.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from systems.framework.compiling import njit
 from systems.planning.hazards import Hazards, make_hazards
 from systems.planning.looks import HazardSensors
+from systems.planning.passage import Passage, make_passage
 from systems.planning.way import Way, make_way
 
 #: Modes of the robot, see ``systems.planning.guarded_drive``.
@@ -69,6 +70,7 @@ class DriveState(NamedTuple):
     memory: DriveMemory
     way: Way
     hazards: Hazards
+    passage: Passage
 
 
 class DriveNumbers(NamedTuple):
@@ -83,11 +85,16 @@ class DriveNumbers(NamedTuple):
     widths: tuple[float, float]
     """Distances that routes keep from occupied cells, m: half of the width of the body
     plus margins, and the radius of the disc around the body plus the same margins. In
-    narrow passages, only the first distance is kept.
+    narrow passages, only the first distance is kept. For a long body, it is one cell of
+    the map less.
     """
     cruise_m_s: float
     """Largest wanted speed, m/s."""
     tick_s: float
+    creep_m_s: float
+    """Speed in a passage in which a long body has to be in line with the axis, m/s. It
+    is 0 if the body is not long.
+    """
 
 
 def make_drive_state(cells: int, sensors: int) -> DriveState:
@@ -102,7 +109,7 @@ def make_drive_state(cells: int, sensors: int) -> DriveState:
         *(np.zeros(2 if name in pairs else 1) for name in DriveMemory._fields)
     )
     memory.planned_s[:], memory.stays_at[:] = -np.inf, np.inf
-    return DriveState(memory, make_way(cells), make_hazards(sensors))
+    return DriveState(memory, make_way(cells), make_hazards(sensors), make_passage())
 
 
 @njit(cache=True)

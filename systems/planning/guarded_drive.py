@@ -38,6 +38,8 @@ from systems.planning.drive_state import (
 from systems.planning.evasion import choose_motion
 from systems.planning.hazards import pick_hazards, track_hazards
 from systems.planning.look_around import begin_look, look_around
+from systems.planning.passage import OPEN, PASSING
+from systems.planning.passing import drive_in_passage
 from systems.planning.turning import TURN_GAIN, slowed_by, turn_rate, wrapped
 from systems.planning.way import MARK_S, NEAR, mark_blocked
 from systems.safety.braking import TURNED
@@ -131,7 +133,8 @@ def drive_guarded(
         restart_stay(m, pose, time)
     # Timer 2: how long the guard has blocked the robot. A guard that passes the
     # command, or only slows the robot, does not block the robot.
-    if report[0] < TURNED or there or wanted <= 0.0:
+    passing = state.passage.state[0] >= PASSING
+    if report[0] < TURNED or there or (wanted <= 0.0 and not passing):
         m.blocked_s[0] = time
     # Timer 3: how long all routes have led through occupied cells.
     if time - m.passable_s[0] > _SEARCH_WAY_S and not there:
@@ -141,20 +144,26 @@ def drive_guarded(
         return
     if m.mode[0] == WAITING or m.mode[0] == GIVING_UP:
         m.mode[0] = DRIVING
-    if m.mode[0] == DRIVING:
+    if m.mode[0] == DRIVING and not passing:
         begin_look(time, pose, pose[2] + error, m, space, numbers)
     if m.mode[0] == LOOKING:
         look_around(time, pose, report, state)
     # The robot has stayed in one place for too long. It marks the place in front of it
     # as blocked, backs off, and plans a new route.
+    if passing:
+        restart_stay(m, pose, time)
     if m.mode[0] == DRIVING and time - m.stays_s[0] > _GIVE_UP_S:
         ahead, at = pose[2] + error, numbers.widths[1] + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
         mark_blocked(state.way, place, time + MARK_S)
+        state.passage.state[0] = OPEN
         begin_backing(m, time)
     if m.mode[0] == BACKING:
         back_off(m, time, pose, error, report)
-    if m.mode[0] == DRIVING:
+    if m.mode[0] == DRIVING and passing:
+        p, theta = state.passage, pose[2]
+        drive_in_passage(m, p, theta, wanted, error, report[1], numbers)
+    elif m.mode[0] == DRIVING:
         _drive(time, velocity, wanted, error, there, state, numbers)
     _evade(time, pose, wanted, error, state, numbers)
 
@@ -218,7 +227,7 @@ def _drive(  # type: ignore[no-untyped-def]
         return
     weave = 0.0
     if wanted > 0.0:
-        width, period = _WEAVE_RAD, _WEAVE_S
+        width, period = _WEAVE_RAD if numbers.creep_m_s == 0.0 else 0.0, _WEAVE_S
         moves = math.hypot(velocity[0], velocity[1]) > RESTS_M_S
         narrow = state.way.dearest[0] >= NEAR
         recent = time - state.hazards.moved_s[0] < _MOVES_S

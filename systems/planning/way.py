@@ -25,8 +25,8 @@ from systems.safety.free_space import NEVER, FreeSpace
 # ``OCCUPIED``: the sides of the body are over an occupied cell.
 FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
 # ``_DOUBTFUL_HITS``: least number of hits of a possibly occupied cell.
-# ``_OCCUPIED_HITS``: least number of hits of an occupied cell.
-_DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
+# ``OCCUPIED_HITS``: least number of hits of an occupied cell.
+_DOUBTFUL_HITS, OCCUPIED_HITS = 1.5, 6.0
 # ``_TIGHT_M``: gap between the disc and an occupied cell below which the price is
 #   ``TIGHT``, m.
 # ``_NEAR_M``: gap between the disc and an occupied cell below which the price is
@@ -215,8 +215,8 @@ def _set_prices(
             if hits < _DOUBTFUL_HITS:
                 continue
             x, y = (low[0] + 0.5 * i + 0.25) * cell, (low[1] + 0.5 * j + 0.25) * cell
-            if not _is_near(clear, x, y):
-                highest = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
+            if not is_near(clear, x, y):
+                highest = OCCUPIED if hits >= OCCUPIED_HITS else DOUBTFUL
                 _keep_off(way, (x, y), widths, highest)
     for k in range(len(way.marks)):
         if way.marks[k, 2] > time:
@@ -225,7 +225,7 @@ def _set_prices(
 
 
 @njit(cache=True)
-def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (compiled)
+def is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (compiled)
     """Checks whether a point is within the radius of a position in ``clear``."""
     for k in range(len(clear)):
         if math.hypot(x - clear[k, 0], y - clear[k, 1]) < clear[k, 2]:

@@ -6,10 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
 from systems.framework.compiling import njit
 from systems.safety.danger import Danger, nearest_view
-from systems.safety.outline import enters, frame_at, gaps, least_between
+from systems.safety.outline import LONG, enters, frame_at, gaps, least_between
 from systems.safety.predicted_motion import BrakingNumbers, braked, roll_on
 from systems.safety.views import IN_PLACE_M, REST_M
 
@@ -21,6 +22,11 @@ _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 #: A robot that turns on the spot counts as at rest if its yaw rate is at most this
 #: value, rad/s.
 SLOW_TURN_RAD_S = 0.3
+#: A long body counts as at rest if no point of its disc is faster, m/s. It is the speed
+#: that ISO 3691-4 permits to driverless trucks which cannot detect persons.
+CREEP_M_S = 0.3
+#: Share of this speed to which a faster command is reduced.
+_ALMOST = 0.99
 #: A robot turns on the spot if two conditions hold. The commanded speed of the axle is
 #: below this number, m/s. The distance that the axle still moves due to the lag of the
 #: motors is below ``IN_PLACE_M``.
@@ -60,7 +66,7 @@ def can_be_braked(
     ``obstacle_speed_m_s``. Then the disc around the axle that contains the body must
     stay ``keep_m`` away from all points that these obstacles may reach, or the robot
     must withdraw from the end of the view. A slow turn on the spot counts as rest and
-    needs no such check.
+    needs no such check, and so does a long body that creeps (``CREEP_M_S``).
 
     Args:
         pose: Present pose (x, y, theta), m and rad.
@@ -81,8 +87,7 @@ def can_be_braked(
     # From a cell that is not free, the way out is unknown.
     if danger.distance_m == -np.inf and not in_place:
         return False
-    turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
-    slow = in_place and turn <= SLOW_TURN_RAD_S
+    slow = _counts_as_rest(speeds, commanded, in_place, numbers)
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
     begin, disc = pose, outline.radius_m + numbers.keep_m
     # Number of distances from ``gaps`` that separate a cell from the body.
@@ -136,6 +141,38 @@ def can_be_braked(
             return True
         if parts % numbers.parts == 0:
             commanded = braked(commanded, numbers)
+
+
+@register_jitable
+def _counts_as_rest(
+    speeds: Any, commanded: Any, in_place: Any, numbers: BrakingNumbers
+) -> bool:
+    """Checks whether the robot is so slow that moving obstacles do not matter."""
+    turn = abs(commanded[1] - commanded[0]) * numbers.wheel_radius_m
+    if in_place and turn / numbers.wheel_separation_m <= SLOW_TURN_RAD_S:
+        return True
+    fastest = max(_fastest_point(commanded, numbers), _fastest_point(speeds, numbers))
+    return _is_long(numbers) and fastest <= CREEP_M_S
+
+
+@register_jitable
+def _is_long(numbers: BrakingNumbers) -> bool:
+    """Checks whether the body is much longer than wide."""
+    outline = numbers.outline
+    return outline.half_length_m >= LONG * outline.half_width_m
+
+
+@njit(cache=True)
+def _fastest_point(
+    wheels: Any, numbers: BrakingNumbers
+) -> float:  # pragma: no cover  (compiled)
+    """Computes the speed of the fastest point of the disc, m/s.
+
+    ``wheels`` are the speeds of the left and right wheel, rad/s.
+    """
+    radius, lever = numbers.wheel_radius_m, numbers.outline.radius_m
+    turn = abs(wheels[1] - wheels[0]) * radius / numbers.wheel_separation_m
+    return _ahead(wheels, radius) + turn * lever
 
 
 @njit(cache=True)
@@ -272,7 +309,8 @@ def chosen(
 
     The function returns the first of these commands that ``can_be_braked`` permits:
 
-    1. the wanted wheel speeds, then smaller shares of them along the same curve
+    1. the wanted wheel speeds, then smaller shares of them along the same curve; with
+       moving obstacles and a long body, also the share with which it creeps
     2. the wanted turn, while the forward motion brakes
     3. the same turn, but slow enough to count as rest
     4. the wanted forward motion without the turn
@@ -296,6 +334,12 @@ def chosen(
         part = share * wish[0], share * wish[1]
         if can_be_braked(pose, speeds, part, danger, numbers):
             return PASSED if number == 0 else SLOWED, part
+    fastest = _fastest_point(wish, numbers)
+    if numbers.obstacle_speed_m_s > 0.0 and fastest > CREEP_M_S and _is_long(numbers):
+        share = _ALMOST * CREEP_M_S / fastest
+        part = share * wish[0], share * wish[1]
+        if can_be_braked(pose, speeds, part, danger, numbers):
+            return SLOWED, part
     slower = braked(commanded, numbers)
     ahead, turn = 0.5 * (slower[0] + slower[1]), 0.5 * (wish[1] - wish[0])
     # Limit the turn to the top speed of the wheels. Otherwise the robot would turn less

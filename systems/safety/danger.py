@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
+from systems.safety.fine_space import fine_edge
 from systems.safety.free_space import FreeSpace, cell_is_free, edge_cells
 from systems.safety.outline import frame_at, gaps
 from systems.safety.predicted_motion import BrakingNumbers
@@ -108,16 +109,22 @@ def danger_of(
     Returns:
         Cells and ends of views, as input of ``can_be_braked``.
     """
+    cell = space.fine.cell_m if len(space.fine.hits) > 0 else space.cell_m
     # The square contains at most this number of cells. Those at the body may count
     # twice.
-    corners = np.empty((2 * int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
+    corners = np.empty((2 * int(2.0 * reach[0] / cell + 3.0) ** 2, 2))
     until = space.rolled_m[0] + reach[1]
     x, y = pose[0], pose[1]
-    count = edge_cells(space, x, y, reach[0], until, corners)
-    distance, frame = np.inf, frame_at(pose, space.cell_m)
-    count = _add_cells_at_body(space, frame, until, corners, count, numbers)
+    distance, frame = np.inf, frame_at(pose, cell)
+    if len(space.fine.hits) > 0:
+        count = fine_edge(
+            space, pose, reach[0], until, numbers.outline, numbers.least_m, corners
+        )
+    else:
+        count = edge_cells(space, x, y, reach[0], until, corners)
+        count = _add_cells_at_body(space, frame, until, corners, count, numbers)
     for k in range(count):
-        now = gaps(corners[k], space.cell_m, frame, numbers.outline)
+        now = gaps(corners[k], cell, frame, numbers.outline)
         distance = min(distance, max(now[0], now[1]))
     i, j = math.floor(x / space.cell_m), math.floor(y / space.cell_m)
     if not cell_is_free(space, i, j, until):
@@ -126,10 +133,10 @@ def danger_of(
     # Without moving obstacles, the ends of views do not matter.
     moving = numbers.obstacle_speed_m_s > 0.0
     arcs = view_arcs(space, len(space.ends) if moving else 0)
-    danger = Danger(corners, count, space.cell_m, distance, arcs, ages, np.inf)
+    danger = Danger(corners, count, cell, distance, arcs, ages, np.inf)
     if moving:
         view_distance = nearest_view(danger, x, y, 0.0, 0.0)
-    return Danger(corners, count, space.cell_m, distance, arcs, ages, view_distance)
+    return Danger(corners, count, cell, distance, arcs, ages, view_distance)
 
 
 @njit(cache=True)

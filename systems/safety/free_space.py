@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,32 @@ from systems.safety.outline import Outline, frame_at, in_body
 
 #: Value of a cell that was never seen free.
 NEVER = -1.0
+_Values: TypeAlias = NDArray[np.float64]
+_Window: TypeAlias = tuple[
+    _Values, _Values, _Values, _Values, NDArray[np.int64], _Values
+]
+#: Number of fine cells along the side of a cell.
+PARTS = 4
 #: The window moves when its middle is farther from the robot than this number of cells.
-_SLACK = 20
+MOST_SLACK = 20
 #: In a small window, this limit is the side of the window divided by this number.
 _SLACK_SHARE = 8
+
+
+class FineSpace(NamedTuple):
+    """Map with finer cells in a smaller window around the robot, for a long body.
+
+    The fields are those of ``FreeSpace``. Each cell of a ``FreeSpace`` consists of
+    ``PARTS`` x ``PARTS`` fine cells. A map for a short body has no fine cells.
+    """
+
+    free_until: NDArray[np.float64]
+    hits: NDArray[np.float64]
+    evidence: NDArray[np.float64]
+    evident_until: NDArray[np.float64]
+    first: NDArray[np.int64]
+    rolled_m: NDArray[np.float64]
+    cell_m: float
 
 
 class FreeSpace(NamedTuple):
@@ -58,10 +80,11 @@ class FreeSpace(NamedTuple):
     """Number of points by which the guard replaces an arc."""
     cell_m: float
     """Side of a cell, m."""
+    fine: FineSpace
 
 
 def make_free_space(
-    cells: int, cell_m: float, sensors: int, arc_points: int
+    cells: int, cell_m: float, sensors: int, arc_points: int, fine_cells: int = 0
 ) -> FreeSpace:
     """Makes a map without any free cells, around the origin of the floor.
 
@@ -70,20 +93,29 @@ def make_free_space(
         cell_m: Side of a cell, m.
         sensors: Number of sensors.
         arc_points: Number of points of the arc at which the view of a sensor ends.
+        fine_cells: Number of fine cells along each side of their window.
 
     Returns:
         The map.
     """
     return FreeSpace(
+        *_window(cells),
+        np.tile((0.0, 0.0, 0.0, 0.0, 0.0, NEVER), (sensors, 1)),
+        arc_points,
+        cell_m,
+        FineSpace(*_window(fine_cells), cell_m / PARTS),
+    )
+
+
+def _window(cells: int) -> _Window:
+    """Makes the first six fields of a map."""
+    return (
         np.full((cells, cells), NEVER),
         np.zeros((cells, cells)),
         np.zeros((cells, cells)),
         np.full((cells, cells), np.inf),
         np.full(2, -(cells // 2)),
         np.zeros(1),
-        np.tile((0.0, 0.0, 0.0, 0.0, 0.0, NEVER), (sensors, 1)),
-        arc_points,
-        cell_m,
     )
 
 
@@ -114,7 +146,11 @@ def cell_is_free(
 
 @njit(cache=True)
 def cells_within(
-    space: FreeSpace, low_x: float, low_y: float, high_x: float, high_y: float
+    space: FreeSpace | FineSpace,
+    low_x: float,
+    low_y: float,
+    high_x: float,
+    high_y: float,
 ) -> tuple[int, int, int, int]:  # pragma: no cover  (compiled)
     """Finds the cells of the window that a rectangle meets.
 
@@ -134,7 +170,7 @@ def cells_within(
 
 @njit(cache=True)
 def move_window(
-    space: FreeSpace, x: float, y: float
+    space: FreeSpace | FineSpace, x: float, y: float
 ) -> None:  # pragma: no cover  (compiled)
     """Moves the window with the robot and forgets the cells that leave the window.
 
@@ -144,7 +180,7 @@ def move_window(
         y: Position of the robot, y in the frame of the odometry, m.
     """
     cells = space.free_until.shape[0]
-    slack = min(_SLACK, cells // _SLACK_SHARE)
+    slack = min(MOST_SLACK, cells // _SLACK_SHARE)
     for axis in range(2):
         place = x if axis == 0 else y
         first = space.first[axis]
@@ -192,7 +228,7 @@ def clear_disc(
 
 @njit(cache=True)
 def clear_outline(
-    space: FreeSpace, pose: Any, outline: Outline, until: float
+    space: FreeSpace | FineSpace, pose: Any, outline: Outline, until: float
 ) -> None:  # pragma: no cover  (compiled)
     """Marks the cells that lie entirely within the outline of the body as free.
 
@@ -239,7 +275,7 @@ def disc_is_free(
     cell = space.cell_m
     low_i, high_i = math.floor((x - radius) / cell), math.ceil((x + radius) / cell) - 1
     low_j, high_j = math.floor((y - radius) / cell), math.ceil((y + radius) / cell) - 1
-    free = _free_cells(space, low_i, low_j, high_i, high_j, space.rolled_m[0])
+    free = free_cells(space, low_i, low_j, high_i, high_j, space.rolled_m[0])
     for i in range(low_i, high_i + 1):
         dx = max(i * cell - x, 0.0, x - (i + 1) * cell)
         for j in range(low_j, high_j + 1):
@@ -275,7 +311,7 @@ def edge_cells(
     low_i, low_j = math.floor((x - reach) / cell), math.floor((y - reach) / cell)
     high_i, high_j = math.floor((x + reach) / cell), math.floor((y + reach) / cell)
     # The square, enlarged by one cell on each side.
-    free = _free_cells(space, low_i - 1, low_j - 1, high_i + 1, high_j + 1, until)
+    free = free_cells(space, low_i - 1, low_j - 1, high_i + 1, high_j + 1, until)
     for a in range(1, free.shape[0] - 1):
         for b in range(1, free.shape[1] - 1):
             if not free[a, b] and (
@@ -289,8 +325,13 @@ def edge_cells(
 
 
 @njit(cache=True)
-def _free_cells(
-    space: FreeSpace, low_i: int, low_j: int, high_i: int, high_j: int, until: float
+def free_cells(
+    space: FreeSpace | FineSpace,
+    low_i: int,
+    low_j: int,
+    high_i: int,
+    high_j: int,
+    until: float,
 ) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
     """Returns ``cell_is_free`` for all cells of a rectangle."""
     cells = space.free_until.shape[0]

@@ -16,6 +16,8 @@ from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
+    MOST_SLACK,
+    PARTS,
     FreeSpace,
     clear_disc,
     clear_outline,
@@ -37,6 +39,8 @@ from systems.safety.views import (
 
 #: Largest angle between two points of a sensor's arc, seen from the sensor, rad.
 _ARC_STEP = 0.035
+#: Distance from the disc around a long body up to which there are fine cells, m.
+_FINE_AHEAD_M = 0.9
 
 
 class MapNumbers(NamedTuple):
@@ -87,7 +91,10 @@ def map_step(
     ranges, echo, ages, pose, commanded = inputs
     space, was_at, error = state.free_space, state.was_at, numbers.error
     time = tick * numbers.tick_s
+    long = len(space.fine.hits) > 0
     move_window(space, pose[0], pose[1])
+    if long:
+        move_window(space.fine, pose[0], pose[1])
     # The first tick clears the start bubble. Each later tick adds the distance rolled
     # since the previous tick.
     if math.isnan(was_at[0]):
@@ -110,6 +117,9 @@ def map_step(
     radius = numbers.outline.radius_m
     until = space.rolled_m[0] + lasting(radius, error)
     clear_outline(space, pose, numbers.outline, until)
+    if long:
+        space.fine.rolled_m[0] = space.rolled_m[0]
+        clear_outline(space.fine, pose, numbers.outline, until)
     if disc_is_free(space, pose[0], pose[1], radius + numbers.margin_m):
         clear_disc(space, pose[0], pose[1], radius, until)
     # Readings of the sensors that have fired in this tick.
@@ -136,6 +146,8 @@ def map_step(
     # Each reading of a sensor updates different rows.
     turn_of_rows = tick // numbers.round_ticks
     see(space, turn_of_rows, pose, numbers.sectors, readings, error)
+    if long:
+        see(space.fine, turn_of_rows, pose, numbers.sectors, readings, error, 1)
 
 
 @register_jitable
@@ -179,6 +191,9 @@ class FreeSpaceMap(Block):
     ``place_error_m``. The error grows as the robot drives, for two reasons: encoders
     count whole pulses, and the travel of each wheel has the relative error
     ``wheel_error``.
+
+    Around a long body (``Outline.is_long``), each cell consists of smaller fine cells.
+    They become free by the same rule, and each reading updates all of them.
 
     At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
     free. The outline of the body always counts as free. While the disc around the axle
@@ -247,7 +262,13 @@ class FreeSpaceMap(Block):
             sensors.round_ticks(tick_s),
         )
         cells = parameters.cells_for(body_radius(robot))
-        space = make_free_space(cells, parameters.cell_m, sensors.count, points)
+        fine_cells = 0
+        if numbers.outline.is_long:
+            fine_m = (body_radius(robot) + _FINE_AHEAD_M) / (parameters.cell_m / PARTS)
+            fine_cells = 2 * (math.ceil(fine_m) + MOST_SLACK)
+        space = make_free_space(
+            cells, parameters.cell_m, sensors.count, points, fine_cells
+        )
         self.declare(
             Step(map_step, numbers, MapState(space, np.full(3, np.nan))),
             tick_s=tick_s,

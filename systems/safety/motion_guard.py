@@ -27,7 +27,7 @@ from systems.safety.danger import danger_of
 from systems.safety.outline import Outline
 from systems.safety.parameters import LEAST_MARGIN_M, MARGIN_M, GuardParameters
 from systems.safety.predicted_motion import BrakingNumbers, rolled_speeds
-from systems.safety.views import stopping_way, tick_parts
+from systems.safety.views import checked_reach, stopping_way, tick_parts
 
 #: Sizes of the four parts of the state: velocity of P, wheel speeds, report, and
 #: modeled wheel speeds.
@@ -230,6 +230,6 @@ def _numbers(
         own.obstacle_speed_m_s or 0.0,
     )
     stopping = stopping_way(own, robot, plant, tick_s)
-    reach = outline.radius_m + keep + stopping + 2.0 * own.cell_m, stopping
+    reach = checked_reach(own, robot, plant, tick_s), stopping
     kept = math.exp(-tick_s / plant.motor_lag_s)
     return GuardNumbers(velocity, robot, braking, kept, reach)

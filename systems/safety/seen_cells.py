@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from systems.framework.compiling import njit
-from systems.safety.free_space import FreeSpace, cells_within
+from systems.safety.free_space import FineSpace, FreeSpace, cells_within
 from systems.safety.group_view import (
     RowView,
     group_view,
@@ -22,7 +22,7 @@ from systems.safety.views import Sectors, lasting
 register_jitable(lasting)
 
 #: A reading updates only one row of cells out of this number of rows. Later readings
-#: update the other rows.
+#: update the other rows. A reading updates all rows of fine cells.
 _ROWS = 4
 #: A cell becomes free if the logarithm of its evidence reaches this limit. By Ville's
 #: inequality, noise alone does this with a probability of at most 2.9e-7, which is the
@@ -35,7 +35,13 @@ _FULL_HIT_M = 0.6
 
 @njit(cache=True, error_model="numpy")
 def see(
-    space: FreeSpace, turn: int, pose: Any, sectors: Sectors, readings: Any, error: Any
+    space: FreeSpace | FineSpace,
+    turn: int,
+    pose: Any,
+    sectors: Sectors,
+    readings: Any,
+    error: Any,
+    rows: int = _ROWS,
 ) -> None:  # pragma: no cover  (compiled)
     """Enters the newest readings of the sensors into the map of free space.
 
@@ -60,8 +66,7 @@ def see(
 
     Args:
         space: Map of free space. The function changes the map in place.
-        turn: Number of the call. One call updates only every fourth row of cells. The
-            next call updates other rows.
+        turn: Number of the call.
         pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
         readings: (sensors, 4) array with four distances per sensor, m. The sensor has
@@ -70,6 +75,8 @@ def see(
             is the reading less all errors but noise, minus infinity without a reading.
             The fourth is the standard deviation of the noise.
         error: Errors that limit how long a cell stays free.
+        rows: One call updates one row of cells out of this number of rows. The next
+            call updates other rows.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
     # Radius of the circle around a cell.
@@ -90,7 +97,7 @@ def see(
         )
         low_i, low_j, high_i, high_j = cells_within(space, low_x, low_y, high_x, high_y)
         view = group_view(sectors, seen, begin, end, pose[2], half)
-        for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
+        for i in range(low_i + (turn - low_i) % rows, high_i + 1, rows):
             dx = (i + 0.5) * cell - sx
             # The cells of the row that are not too far away.
             reach = math.sqrt(max((farthest + cell) ** 2 - dx * dx, 0.0))
@@ -122,7 +129,7 @@ def _greatest(seen: Any, begin: int, end: int, column: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _enter_free(
-    space: FreeSpace,
+    space: FreeSpace | FineSpace,
     piece: Any,
     row: RowView,
     place: Any,
@@ -156,7 +163,7 @@ def _enter_free(
 
 @njit(cache=True, error_model="numpy")
 def _enter_doubts(
-    space: FreeSpace,
+    space: FreeSpace | FineSpace,
     piece: Any,
     row: RowView,
     from_axle: float,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.parameters import GuardParameters
+from systems.safety.parameters import MARGIN_M, GuardParameters
 
 #: The rims of the wheels count as at rest if the lag of the motors will move them by
 #: less than this distance, m.
@@ -210,6 +210,18 @@ def stopping_way(
     top = robot.top_speed_m_s
     delayed = plant.motor_lag_s + 2.0 * tick_s
     return top * top / (2.0 * own.braking_m_s2) + top * delayed
+
+
+def checked_reach(
+    own: GuardParameters, robot: RobotParameters, plant: PlantParameters, tick_s: float
+) -> float:
+    """Computes the distance from the axle within which the guard checks cells, m.
+
+    The arguments are those of ``stopping_way``.
+    """
+    stopping = stopping_way(own, robot, plant, tick_s)
+    keep = own.place_error_m + MARGIN_M
+    return body_radius(robot) + keep + stopping + 2.0 * own.cell_m
 
 
 def tick_parts(tick_s: float) -> int:
