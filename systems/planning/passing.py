@@ -189,7 +189,7 @@ def drive_in_passage(
         m.speed[0], m.turn[0] = speed, speed * rate
         return
     if abs(error) > TURN_FIRST_RAD:
-        m.speed[0], m.turn[0] = 0.0, turn_rate(wrapped(p.axis[0] - theta))
+        m.speed[0], m.turn[0] = 0.0, turn_rate(error)
         return
     ahead, rate = math.cos(error), math.sin(error) / half_length
     speed = math.copysign(numbers.creep_m_s, wanted) / (ahead + abs(rate) * radius)

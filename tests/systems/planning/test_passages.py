@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from phonotaxis import load_scenario, simulate
-from systems.planning.passage import front_error, lines_up, make_passage
+from systems.planning.drive_state import make_drive_state
+from systems.planning.passage import (
+    PASSING,
+    along_axis,
+    front_error,
+    lines_up,
+    make_passage,
+)
 from systems.planning.passage_axis import fit_axis
 from systems.planning.passage_search import occupied_points, sides
+from systems.planning.passing import drive_in_passage
 from systems.safety.fine_space import free_fine_cells
 from systems.safety.free_space import PARTS, cell_is_free, make_free_space
 
@@ -55,6 +64,18 @@ def test_a_body_whose_front_follows_the_axis_lines_up_as_a_tractrix(heading):
             (front, 0.0), abs=1e-12
         )
         assert lines_up(passage, (*pose, heading), HALF) == expected
+
+
+def test_a_body_beside_the_axis_turns_its_front_toward_it():
+    """In line with the axis, and 1 m beside it: the front has to move by 66 deg."""
+    passage, memory = make_passage(), make_drive_state(8, 1).memory
+    passage.state[0] = PASSING
+    error = along_axis(passage, (0.0, 1.0, 0.0), HALF[0])
+    assert error == pytest.approx(-math.atan(1.0 / 0.45))
+    numbers = SimpleNamespace(half_size=HALF, widths=(1.0, 1.02), creep_m_s=0.3)
+    drive_in_passage(memory, passage, 0.0, 0.3, error, 1.0, numbers)
+    assert memory.speed[0] == 0.0
+    assert memory.turn[0] < -0.1
 
 
 def test_nearest_points_on_both_sides():
