@@ -54,7 +54,7 @@ class TrackParameters(Parameters):
     """Probability that a sounding source is detected in a step."""
     false_detections: Positive = 0.05
     """Mean number of false detections per step, over the whole circle."""
-    smear_s: Positive = 0.15
+    smear_s: Positive = 0.1
     """Time that determines the scatter of the detections of a moving source, s. The
     scatter is the motion of the source in this time."""
     resolution_deg: float = Field(default=20.0, gt=0.0, le=90.0)
