@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,7 +73,7 @@ def test_a_body_beside_the_axis_turns_its_front_toward_it():
     passage.state[0] = PASSING
     error = along_axis(passage, (0.0, 1.0, 0.0), HALF[0])
     assert error == pytest.approx(-math.atan(1.0 / 0.45))
-    numbers = SimpleNamespace(half_size=HALF, widths=(1.0, 1.02), creep_m_s=0.3)
+    numbers: Any = SimpleNamespace(half_size=HALF, widths=(1.0, 1.02), creep_m_s=0.3)
     drive_in_passage(memory, passage, 0.0, 0.3, error, 1.0, numbers)
     assert memory.speed[0] == 0.0
     assert memory.turn[0] < -0.1
