@@ -31,6 +31,9 @@ _CLEARANCE_M = 0.02
 _CRUISE_SHARE = 0.86
 #: Share of the largest speed that counts as rest at which a long body passes.
 _CREEP_SHARE = 0.96
+#: Width of a passage that a long body passes without lining up if all obstacles are at
+#: rest, as a multiple of its width.
+_WIDE = 1.5
 
 
 def guarded_step(
@@ -146,6 +149,9 @@ class GuardedController(Block):
         if outline.is_long:
             # Echoes seem to come from up to one cell in front of a wall.
             creep, narrow = _CREEP_SHARE * CREEP_M_S, narrow - guard.cell_m
+        widest = 2.0 * (disc + margin)
+        if guard.obstacle_speed_m_s == 0.0:
+            widest = min(widest, _WIDE * robot.width_m)
         numbers = DriveNumbers(
             attraction.follow_distance_m,
             robot.control_point_m,
@@ -155,6 +161,7 @@ class GuardedController(Block):
             cruise_speed(robot),
             tick_s,
             creep,
+            widest,
         )
         state = make_drive_state(guard.cells_for(disc), sensors.count)
         self.declare(

@@ -95,6 +95,8 @@ class DriveNumbers(NamedTuple):
     """Speed in a passage in which a long body has to be in line with the axis, m/s. It
     is 0 if the body is not long.
     """
+    widest_m: float
+    """Width of a passage from which on a long body passes it without lining up, m."""
 
 
 def make_drive_state(cells: int, sensors: int) -> DriveState:

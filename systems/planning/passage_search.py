@@ -130,9 +130,9 @@ def sides(
 
 @njit(cache=True)
 def _narrow_part(
-    way: Way, points: Any, radius: float
+    way: Way, points: Any, radius: float, widest: float
 ) -> tuple[int, int]:  # pragma: no cover  (compiled)
-    """Finds the first part of the route with points on both sides within the disc.
+    """Finds the first narrow part of the route, with points on both sides.
 
     Returns:
         Numbers of its first and last point, or -1 and -1.
@@ -143,7 +143,7 @@ def _narrow_part(
         step = math.hypot(x - way.path[k - 1, 0], y - way.path[k - 1, 1])
         length += step
         first, second = sides(points, x, y)
-        if first + second < 2.0 * radius:
+        if first + second < widest:
             if begin < 0:
                 if length > _AHEAD_M:
                     break
@@ -158,7 +158,12 @@ def _narrow_part(
 
 @njit(cache=True)
 def find_passage(
-    p: Passage, way: Way, points: Any, radius: float, half_size: Any
+    p: Passage,
+    way: Way,
+    points: Any,
+    radius: float,
+    half_size: Any,
+    widest: float,
 ) -> None:  # pragma: no cover  (compiled)
     """Finds the first passage of the route, and where to line up for it.
 
@@ -168,9 +173,10 @@ def find_passage(
         points: (n, 2) positions of occupied cells, m.
         radius: Radius of the disc around the body, with margin, m.
         half_size: Half of the body's length and width, m.
+        widest: Width from which on the robot does not line up, m.
     """
     p.state[0] = OPEN
-    begin, end = _narrow_part(way, points, radius)
+    begin, end = _narrow_part(way, points, radius, widest)
     if begin < 0:
         return
     a, b, m = way.path[begin], way.path[end], way.path[(begin + end) // 2]
@@ -186,7 +192,7 @@ def find_passage(
     for _ in range(2):
         fit_axis(p, points, _TURN_RAD, _STEP_RAD)
     fit_axis(p, points, _FINE_TURN_RAD, _FINE_STEP_RAD)
-    if p.width_m[0] < NARROWEST * half_size[1] or p.width_m[0] >= 2.0 * radius:
+    if p.width_m[0] < NARROWEST * half_size[1] or p.width_m[0] >= widest:
         return
     p.state[0], p.failures[0] = APPROACHING, 0.0
     place_approach(p, points, radius, half_size[0])

@@ -90,12 +90,15 @@ def plan_passage(
     if p.state[0] >= PASSING:
         return
     if p.state[0] == OPEN:
-        find_passage(p, state.way, points, radius, half_size)
+        find_passage(p, state.way, points, radius, half_size, numbers.widest_m)
         if p.state[0] == OPEN:
             return
     else:
         p.maps[0] = 0.0
         refine_axis(p, points, radius, half_size[1])
+        if p.width_m[0] >= numbers.widest_m:
+            p.state[0] = OPEN
+            return
         place_approach(p, points, radius, half_size[0])
     left = math.hypot(p.approach[0] - pose[0], p.approach[1] - pose[1])
     if left < _THERE_M or lines_up(p, pose, half_size):
