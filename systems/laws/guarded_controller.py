@@ -21,7 +21,7 @@ from systems.planning.guarded_drive import drive_guarded
 from systems.planning.looks import HazardSensors
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.braking import CREEP_M_S
-from systems.safety.outline import Outline
+from systems.safety.outline import Outline, is_long
 from systems.safety.parameters import GuardParameters
 from systems.safety.views import range_errors
 
@@ -146,7 +146,7 @@ class GuardedController(Block):
         disc, outline = body_radius(robot), Outline.of(robot)
         narrow = 0.5 * robot.width_m if robot.length_m > robot.width_m else disc
         creep = 0.0
-        if outline.is_long:
+        if is_long(outline):
             # Echoes seem to come from up to one cell in front of a wall.
             creep, narrow = _CREEP_SHARE * CREEP_M_S, narrow - guard.cell_m
         widest = 2.0 * (disc + margin)

@@ -48,7 +48,7 @@ class Passage(NamedTuple):
     """The passage for which the robot lines up. Arrays have the shape (1,)."""
 
     state: NDArray[np.float64]
-    """``OPEN``, ``APPROACHING`` or ``PASSING``."""
+    """One of the states from ``OPEN`` to ``LEAVING``."""
     middle: NDArray[np.float64]
     """(2,) point (x, y) on the axis, in the middle of the passage, m."""
     axis: NDArray[np.float64]

@@ -109,9 +109,14 @@ def plan_passage(
 
 
 @register_jitable
-def _plan_passing(  # type: ignore[no-untyped-def]
-    time, pose, state, points, space, numbers
-):
+def _plan_passing(
+    time: float,
+    pose: Any,
+    state: DriveState,
+    points: Any,
+    space: FreeSpace,
+    numbers: DriveNumbers,
+) -> None:
     """Adapts the axis, and decides whether the robot has passed or has to back out."""
     p, half_size, radius = state.passage, numbers.half_size, numbers.widths[1]
     along, _ = front_error(p, pose, half_size[0])
@@ -132,9 +137,9 @@ def _plan_passing(  # type: ignore[no-untyped-def]
 
 
 @register_jitable
-def _plan_retreat(  # type: ignore[no-untyped-def]
-    time, pose, state, points, half_size
-):
+def _plan_retreat(
+    time: float, pose: Any, state: DriveState, points: Any, half_size: Any
+) -> None:
     """Adapts the axis, and decides whether the robot tries again or gives up."""
     p, back = state.passage, _BACK
     along, _ = front_error(p, pose, half_size[0])

@@ -25,8 +25,8 @@ from systems.safety.free_space import NEVER, FreeSpace
 # ``OCCUPIED``: the sides of the body are over an occupied cell.
 FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
 # ``_DOUBTFUL_HITS``: least number of hits of a possibly occupied cell.
-# ``OCCUPIED_HITS``: least number of hits of an occupied cell.
-_DOUBTFUL_HITS, OCCUPIED_HITS = 1.5, 6.0
+# ``_OCCUPIED_HITS``: least number of hits of an occupied cell.
+_DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
 # ``_TIGHT_M``: gap between the disc and an occupied cell below which the price is
 #   ``TIGHT``, m.
 # ``_NEAR_M``: gap between the disc and an occupied cell below which the price is
@@ -216,7 +216,7 @@ def _set_prices(
                 continue
             x, y = (low[0] + 0.5 * i + 0.25) * cell, (low[1] + 0.5 * j + 0.25) * cell
             if not is_near(clear, x, y):
-                highest = OCCUPIED if hits >= OCCUPIED_HITS else DOUBTFUL
+                highest = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
                 _keep_off(way, (x, y), widths, highest)
     for k in range(len(way.marks)):
         if way.marks[k, 2] > time:

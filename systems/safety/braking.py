@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 
 from systems.framework.compiling import njit
 from systems.safety.danger import Danger, nearest_view
-from systems.safety.outline import LONG, enters, frame_at, gaps, least_between
+from systems.safety.outline import enters, frame_at, gaps, is_long, least_between
 from systems.safety.predicted_motion import BrakingNumbers, braked, roll_on
 from systems.safety.views import IN_PLACE_M, REST_M
 
@@ -22,8 +22,7 @@ _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 #: A robot that turns on the spot counts as at rest if its yaw rate is at most this
 #: value, rad/s.
 SLOW_TURN_RAD_S = 0.3
-#: A long body counts as at rest if no point of its disc is faster, m/s. It is the speed
-#: that ISO 3691-4 permits to driverless trucks which cannot detect persons.
+#: A long body counts as at rest if no point of its disc is faster, m/s (our choice).
 CREEP_M_S = 0.3
 #: Share of this speed to which a faster command is reduced.
 _ALMOST = 0.99
@@ -152,14 +151,7 @@ def _counts_as_rest(
     if in_place and turn / numbers.wheel_separation_m <= SLOW_TURN_RAD_S:
         return True
     fastest = max(_fastest_point(commanded, numbers), _fastest_point(speeds, numbers))
-    return _is_long(numbers) and fastest <= CREEP_M_S
-
-
-@register_jitable
-def _is_long(numbers: BrakingNumbers) -> bool:
-    """Checks whether the body is much longer than wide."""
-    outline = numbers.outline
-    return outline.half_length_m >= LONG * outline.half_width_m
+    return is_long(numbers.outline) and fastest <= CREEP_M_S
 
 
 @njit(cache=True)
@@ -335,7 +327,8 @@ def chosen(
         if can_be_braked(pose, speeds, part, danger, numbers):
             return PASSED if number == 0 else SLOWED, part
     fastest = _fastest_point(wish, numbers)
-    if numbers.obstacle_speed_m_s > 0.0 and fastest > CREEP_M_S and _is_long(numbers):
+    moving = numbers.obstacle_speed_m_s > 0.0
+    if moving and fastest > CREEP_M_S and is_long(numbers.outline):
         share = _ALMOST * CREEP_M_S / fastest
         part = share * wish[0], share * wish[1]
         if can_be_braked(pose, speeds, part, danger, numbers):

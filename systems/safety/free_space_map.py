@@ -25,7 +25,7 @@ from systems.safety.free_space import (
     make_free_space,
     move_window,
 )
-from systems.safety.outline import Outline
+from systems.safety.outline import Outline, is_long
 from systems.safety.parameters import LEAST_MARGIN_M, GuardParameters
 from systems.safety.seen_cells import end_view, see
 from systems.safety.views import (
@@ -192,7 +192,7 @@ class FreeSpaceMap(Block):
     count whole pulses, and the travel of each wheel has the relative error
     ``wheel_error``.
 
-    Around a long body (``Outline.is_long``), each cell consists of smaller fine cells.
+    Around a long body (``is_long``), each cell consists of smaller fine cells.
     They become free by the same rule, and each reading updates all of them.
 
     At the start, a disc around the axle with the radius ``start_bubble_m`` counts as
@@ -263,7 +263,7 @@ class FreeSpaceMap(Block):
         )
         cells = parameters.cells_for(body_radius(robot))
         fine_cells = 0
-        if numbers.outline.is_long:
+        if is_long(numbers.outline):
             fine_m = (body_radius(robot) + _FINE_AHEAD_M) / (parameters.cell_m / PARTS)
             fine_cells = 2 * (math.ceil(fine_m) + MOST_SLACK)
         space = make_free_space(

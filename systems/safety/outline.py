@@ -16,8 +16,8 @@ from numba.extending import register_jitable
 from systems.base.robot import RobotParameters, body_radius
 from systems.framework.compiling import njit
 
-#: Least length of a long body, as a multiple of its width.
-LONG = 1.5
+# Least length of a long body, as a multiple of its width.
+_LONG = 1.5
 #: Outward speed of a point of the outline that counts as 0, m/s.
 _STILL_M_S = 1e-6
 
@@ -30,15 +30,16 @@ class Outline(NamedTuple):
     radius_m: float
     """Radius of the disc around the axle that contains the outline, m."""
 
-    @property
-    def is_long(self) -> bool:
-        """True if the disc around the body is much wider than the body."""
-        return self.half_length_m >= LONG * self.half_width_m
-
     @classmethod
     def of(cls, robot: RobotParameters) -> Outline:
         """Returns the outline of a robot."""
         return cls(0.5 * robot.length_m, 0.5 * robot.width_m, body_radius(robot))
+
+
+@register_jitable
+def is_long(outline: Outline) -> bool:
+    """Checks whether the disc around the body is much wider than the body."""
+    return outline.half_length_m >= _LONG * outline.half_width_m
 
 
 class Frame(NamedTuple):
