@@ -142,7 +142,7 @@ def map_step(
         readings[k, 3] = noise_m
         place = numbers.places[k, 0], numbers.places[k, 1]
         direction = numbers.directions[k, 0], numbers.directions[k, 1]
-        end_view(space, k, time, pose, place, direction, readings[k, 0])
+        end_view(space.ends[k], time, pose, place, direction, readings[k, 0])
     # Each reading of a sensor updates different rows.
     turn_of_rows = tick // numbers.round_ticks
     see(space, turn_of_rows, pose, numbers.sectors, readings, error)

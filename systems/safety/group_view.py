@@ -70,7 +70,7 @@ class GroupView(NamedTuple):
     sizes: NDArray[np.int64]
     """(2,) number of edges on each side."""
     seen: NDArray[np.float64]
-    """(2, n + 1, 3) distance seen free, reading less all errors but noise, and distance
+    """(2, 3, n + 1) distance seen free, reading less all errors but noise, and distance
     of the echo in each sector on a side, m. The first sector contains the direction of
     -y. Each edge begins the next sector."""
     edges: NDArray[np.float64]
@@ -95,9 +95,8 @@ class RowView(NamedTuple):
     """(m,) distance of the nearest echo, m."""
     doubt: NDArray[np.float64]
     """(m,) scratch memory for the cells that may change."""
-    begins: NDArray[np.int64]
-    """(m + 1,) scratch memory for the number of sectors that begin at each cell. It is
-    0 between two calls of ``look_along_row``."""
+    begins: NDArray[np.uint64]
+    """(m + 1,) scratch memory for the number of sectors that begin at each cell."""
 
 
 @register_jitable
@@ -109,7 +108,7 @@ def row_view(cells: int) -> RowView:
         np.empty(cells),
         np.empty(cells),
         np.empty(cells),
-        np.zeros(cells + 1, np.int64),
+        np.empty(cells + 1, np.uint64),
     )
 
 
@@ -150,13 +149,13 @@ def group_view(
         count += 1
     view = GroupView(
         np.zeros(2, np.int64),
-        np.empty((2, most + 1, 3)),
+        np.empty((2, 3, most + 1)),
         np.empty((2, 6, most)),
         np.empty((3, most)),
     )
     sector = _sector_of_minus_y(cosines, sines, count)
     for n in range(3):
-        view.seen[0, 0, n] = view.seen[1, 0, n] = views[sector, n]
+        view.seen[0, n, 0] = view.seen[1, n, 0] = views[sector, n]
     for n in range(1, count + 1):
         # Edge k is between the sectors k - 1 and k.
         k = (sector + n) % count
@@ -216,7 +215,7 @@ def _add_edge(
     for m in range(2):
         edges[side, 4 + m, n] = min(views[before, m], views[behind, m])
     for m in range(3):
-        view.seen[side, n + 1, m] = views[behind, m]
+        view.seen[side, m, n + 1] = views[behind, m]
     view.sizes[side] = n + 1
 
 
@@ -264,15 +263,15 @@ def _fill_row(
     """
     begins, seen, cuts = row.begins, view.seen, view.cuts
     ways, readings, echoes = row.way, row.reading, row.echo
+    begins[: count + 1] = 0
     for k in range(view.sizes[side]):
-        begins[int(cuts[0, k])] += 1
-    sector = 0
+        begins[int(cuts[0, k])] += np.uint64(1)
+    # numba checks the sign of every index that may be negative.
+    sector = np.uint64(0)
     for n in range(count):
         sector += begins[n]
-        begins[n] = 0
-        ways[n], readings[n] = seen[side, sector, 0], seen[side, sector, 1]
-        echoes[n] = seen[side, sector, 2]
-    begins[count] = 0
+        ways[n], readings[n] = seen[side, 0, sector], seen[side, 1, sector]
+        echoes[n] = seen[side, 2, sector]
 
 
 @register_jitable(inline="always")
@@ -284,7 +283,8 @@ def _meet_edges(
     ways, readings, echoes = row.way, row.reading, row.echo
     for k in range(view.sizes[side]):
         way, reading = edges[side, 4, k], edges[side, 5, k]
-        for n in range(int(cuts[1, k]), int(cuts[2, k])):
+        begin, end = np.uint64(int(cuts[1, k])), np.uint64(int(cuts[2, k]))
+        for n in range(begin, end):
             ways[n] = min(ways[n], way)
             readings[n] = min(readings[n], reading)
             if way == _OUT_OF_VIEW:

@@ -106,16 +106,27 @@ def see(
             if count <= 0:
                 continue
             look_along_row(dx, (first + 0.5) * cell - sy, cell, count, view, row)
+            place = dx, sy, first, from_axle, cell
             # The map stores the row in two pieces, because its indices wrap around.
-            at, place = first % cells, (dx, sy, first)
-            stop = min(count, cells - at)
-            piece = 0, stop, i % cells, at
-            _enter_free(space, piece, row, place, from_axle, error)
-            _enter_doubts(space, piece, row, from_axle, error, sigma)
-            if stop < count:
-                piece = stop, count, i % cells, 0
-                _enter_free(space, piece, row, place, from_axle, error)
-                _enter_doubts(space, piece, row, from_axle, error, sigma)
+            at = i % cells, first % cells
+            stop = min(count, cells - at[1])
+            for done, end, low in ((0, stop, at[1]), (stop, count, 0)):
+                if done == end:
+                    continue
+                high = low + end - done
+                # Each call copies its arguments. Those of the map have many arrays.
+                _enter_row(
+                    space.free_until[at[0], low:high],
+                    space.hits[at[0], low:high],
+                    space.evidence[at[0], low:high],
+                    space.evident_until[at[0], low:high],
+                    row,
+                    done,
+                    place,
+                    space.rolled_m[0],
+                    sigma,
+                    error,
+                )
 
 
 @register_jitable
@@ -128,67 +139,52 @@ def _greatest(seen: Any, begin: int, end: int, column: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _enter_free(
-    space: FreeSpace | FineSpace,
-    piece: Any,
+def _enter_row(
+    free_until: Any,
+    hits: Any,
+    evidence: Any,
+    valid_until: Any,
     row: RowView,
+    begin: int,
     place: Any,
-    from_axle: float,
+    rolled_m: float,
+    sigma: float,
     error: Any,
 ) -> None:  # pragma: no cover  (compiled)
-    """Marks the cells of a row that the newest readings alone have seen free.
+    """Enters what the sensors have seen into a piece of a row of the map.
 
-    The function also computes the distances of the cells. Its loop has no branches, so
-    that the processor computes several cells at once.
+    ``free_until``, ``hits``, ``evidence``, and ``valid_until`` (``evident_until``) are
+    this piece of the arrays of the map. Its first cell has the index ``begin`` in
+    ``row``. ``place`` has the position of the row relative to the group along x, m, the
+    position of the group along y, m, the index on the floor of the first cell of
+    ``row``, the distance of the group from the axle, m, and the side of a cell, m.
+    ``rolled_m`` is the rolled distance, m, and ``sigma`` is the standard deviation of
+    the noise, m.
 
-    ``piece`` has four indices: of the first cell of the piece in ``row``, of the cell
-    after its last, of the row in the arrays of the map, and of the first cell there.
-    ``place`` has the position of the row relative to the group along x, m, the position
-    of the group along y, m, and the index on the floor of the first cell of ``row``.
-    ``from_axle`` is the distance of the group from the axle, m.
+    The first two loops have no branches, so that the processor computes several cells
+    at once. They are separate, because numba would otherwise compute both cases of
+    ``lasting`` for each cell.
     """
-    begin, end, i, at = piece
-    (dx, sy, first), cell = place, space.cell_m
-    half, rolled_m = cell * math.sqrt(0.5), space.rolled_m[0]
-    free_until = space.free_until[i, at : at + end - begin]
-    ways, distances = row.way[begin:end], row.distance[begin:end]
-    for k in range(end - begin):
+    (dx, sy, first, from_axle, cell), end = place, begin + len(hits)
+    half, count = cell * math.sqrt(0.5), len(hits)
+    ways, readings = row.way[begin:end], row.reading[begin:end]
+    echoes, doubts = row.echo[begin:end], row.doubt[begin:end]
+    distances = row.distance[begin:end]
+    # Few cells have hits or evidence to change. The first loop finds them, and a few
+    # more at the ends of echoes.
+    for k in range(count):
         dy = (first + begin + k + 0.5) * cell - sy
         distance = math.sqrt(dx * dx + dy * dy)
+        far, behind = distance + half, abs(distance - echoes[k])
+        doubt = max(readings[k] - far, 1.001 * half - behind)
+        doubts[k] = max(hits[k] if ways[k] >= far else doubt, evidence[k])
+        distances[k] = distance
+    # The cells that the newest readings alone have seen free.
+    for k in range(count):
+        distance = distances[k]
         free = (ways[k] >= distance + half) & (distance >= 2.0 * half)
         until = max(free_until[k], rolled_m + lasting(distance + from_axle, error))
         free_until[k] = until if free else free_until[k]
-        distances[k] = distance
-
-
-@njit(cache=True, error_model="numpy")
-def _enter_doubts(
-    space: FreeSpace | FineSpace,
-    piece: Any,
-    row: RowView,
-    from_axle: float,
-    error: Any,
-    sigma: float,
-) -> None:  # pragma: no cover  (compiled)
-    """Changes the hits and the evidence of the cells of a row.
-
-    See ``_enter_free`` for the arguments. ``sigma`` is the standard deviation of the
-    noise, m.
-    """
-    begin, end, i, at = piece
-    count, stop = end - begin, at + end - begin
-    half, rolled_m = space.cell_m * math.sqrt(0.5), space.rolled_m[0]
-    free_until, hits = space.free_until[i, at:stop], space.hits[i, at:stop]
-    evidence, valid_until = space.evidence[i, at:stop], space.evident_until[i, at:stop]
-    ways, readings = row.way[begin:end], row.reading[begin:end]
-    echoes, distances = row.echo[begin:end], row.distance[begin:end]
-    doubts = row.doubt
-    # Few cells have anything to change. This loop without branches finds them, and a
-    # few more at the ends of echoes.
-    for k in range(count):
-        far, behind = distances[k] + half, abs(distances[k] - echoes[k])
-        doubt = max(readings[k] - far, 1.001 * half - behind)
-        doubts[k] = max(hits[k] if ways[k] >= far else doubt, evidence[k])
     for k in range(count):
         distance = distances[k]
         if doubts[k] <= 0.0 or distance < 2.0 * half:
@@ -212,10 +208,9 @@ def _enter_doubts(
             hits[k] += min(1.0, _FULL_HIT_M / distance)
 
 
-@njit(cache=True)
+@register_jitable(inline="always")
 def end_view(
-    space: FreeSpace,
-    sensor: int,
+    end: Any,
     time: float,
     pose: Any,
     place: Any,
@@ -225,8 +220,7 @@ def end_view(
     """Stores the arc at which the view of a sensor ends.
 
     Args:
-        space: Map of free space. The function changes the map in place.
-        sensor: Index of the sensor.
+        end: (6,) row of the sensor in ``FreeSpace.ends``, which the function fills.
         time: Current time, s.
         pose: Pose (x, y, theta) of the robot by its odometry, m and rad.
         place: Position (x, y) of the sensor relative to the axle, in the axes of the
@@ -238,7 +232,6 @@ def end_view(
     axis, half_angle = direction
     c, s = math.cos(pose[2]), math.sin(pose[2])
     x, y = pose[0] + c * place[0] - s * place[1], pose[1] + s * place[0] + c * place[1]
-    end = space.ends[sensor]
     end[0], end[1], end[2], end[3] = x, y, pose[2] + axis, half_angle
     end[4], end[5] = reach, time
 

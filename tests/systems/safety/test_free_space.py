@@ -481,7 +481,7 @@ def test_cells_count_as_long_as_their_distance_from_the_axle_allows():
 
 def test_where_a_view_ends():
     space = make_free_space(10, CELL_M, 2, 5)
-    end_view(space, 1, 3.0, (1.0, 2.0, 0.5), (0.2, 0.1), (0.3, 0.25), 1.7)
+    end_view(space.ends[1], 3.0, (1.0, 2.0, 0.5), (0.2, 0.1), (0.3, 0.25), 1.7)
     c, s = math.cos(0.5), math.sin(0.5)
     sensor = 1.0 + 0.2 * c - 0.1 * s, 2.0 + 0.2 * s + 0.1 * c
     expected = [
