@@ -113,20 +113,15 @@ def see(
             for done, end, low in ((0, stop, at[1]), (stop, count, 0)):
                 if done == end:
                     continue
+                # To pass the whole map would copy many arrays.
                 high = low + end - done
-                # Each call copies its arguments. Those of the map have many arrays.
-                _enter_row(
+                piece = (
                     space.free_until[at[0], low:high],
                     space.hits[at[0], low:high],
                     space.evidence[at[0], low:high],
                     space.evident_until[at[0], low:high],
-                    row,
-                    done,
-                    place,
-                    space.rolled_m[0],
-                    sigma,
-                    error,
                 )
+                _enter_row(piece, row, done, place, space.rolled_m[0], sigma, error)
 
 
 @register_jitable
@@ -140,10 +135,7 @@ def _greatest(seen: Any, begin: int, end: int, column: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _enter_row(
-    free_until: Any,
-    hits: Any,
-    evidence: Any,
-    valid_until: Any,
+    piece: Any,
     row: RowView,
     begin: int,
     place: Any,
@@ -153,8 +145,8 @@ def _enter_row(
 ) -> None:  # pragma: no cover  (compiled)
     """Enters what the sensors have seen into a piece of a row of the map.
 
-    ``free_until``, ``hits``, ``evidence``, and ``valid_until`` (``evident_until``) are
-    this piece of the arrays of the map. Its first cell has the index ``begin`` in
+    ``piece`` has this piece of four arrays of the map: ``free_until``, ``hits``,
+    ``evidence``, and ``evident_until``. Its first cell has the index ``begin`` in
     ``row``. ``place`` has the position of the row relative to the group along x, m, the
     position of the group along y, m, the index on the floor of the first cell of
     ``row``, the distance of the group from the axle, m, and the side of a cell, m.
@@ -165,8 +157,9 @@ def _enter_row(
     at once. They are separate, because numba would otherwise compute both cases of
     ``lasting`` for each cell.
     """
-    (dx, sy, first, from_axle, cell), end = place, begin + len(hits)
-    half, count = cell * math.sqrt(0.5), len(hits)
+    free_until, hits, evidence, valid_until = piece
+    (dx, sy, first, from_axle, cell), count = place, len(hits)
+    half, end = cell * math.sqrt(0.5), begin + count
     ways, readings = row.way[begin:end], row.reading[begin:end]
     echoes, doubts = row.echo[begin:end], row.doubt[begin:end]
     distances = row.distance[begin:end]

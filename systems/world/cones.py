@@ -158,7 +158,7 @@ def _is_inside(
     return True
 
 
-@register_jitable
+@register_jitable(inline="always")
 def _fill_corners_from(
     corners: NDArray[np.float64], rectangle: NDArray[np.float64], x: float, y: float
 ) -> None:  # pragma: no cover  (compiled)
@@ -286,7 +286,7 @@ def _fan_end(
     return end
 
 
-@register_jitable
+@register_jitable(inline="always")
 def _see_rectangle(
     ranges: NDArray[np.float64],
     at: tuple[float, float],
