@@ -6,9 +6,6 @@ other cells count as free, also those that no sensor has seen.
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,7 +21,7 @@ SOURCE_CLEARANCE_M = 0.5
 
 @njit(cache=True)
 def list_occupied(
-    space: FreeSpace, x: float, y: float, reach: float, clear: Any
+    space: FreeSpace, x: float, y: float, reach: float
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Lists the occupied cells in a square around a position.
 
@@ -33,33 +30,24 @@ def list_occupied(
         x: Position, x in the world frame W, m.
         y: Position, y in W, m.
         reach: Half of the side of the square, m.
-        clear: Position (x, y) and radius of a disc, m. The list omits the cells in this
-            disc. A negative radius omits no cells.
 
     Returns:
         (n, 3) array with one row per cell: x and y of the middle, m, and the certainty
         that the cell is occupied, 0 to 1.
     """
     cell, cells = space.cell_m, space.hits.shape[0]
-    found, count = np.empty((64, 3)), 0
     low_i, low_j, high_i, high_j = cells_within(
         space, x - reach, y - reach, x + reach, y + reach
     )
+    most = max(high_i - low_i + 1, 0) * max(high_j - low_j + 1, 0)
+    found, count = np.empty((most, 3)), 0
     for i in range(low_i, high_i + 1):
         row, at = space.hits[i % cells], low_j % cells - 1
         for j in range(low_j, high_j + 1):
             at = at + 1 if at + 1 < cells else 0
-            hits = row[at]
-            if hits < _LEAST_HITS:
-                continue
-            px, py = (i + 0.5) * cell, (j + 0.5) * cell
-            if math.hypot(px - clear[0], py - clear[1]) < clear[2]:
-                continue
-            if count == len(found):
-                more = np.empty((2 * count, 3))
-                more[:count] = found
-                found = more
-            found[count, 0], found[count, 1] = px, py
-            found[count, 2] = min(hits, _MOST_HITS) / _MOST_HITS
-            count += 1
+            if row[at] >= _LEAST_HITS:
+                found[count, 0] = (i + 0.5) * cell
+                found[count, 1] = (j + 0.5) * cell
+                found[count, 2] = min(row[at], _MOST_HITS) / _MOST_HITS
+                count += 1
     return found[:count]

@@ -74,7 +74,7 @@ def occupied_around(inputs: Any, reach_m: float) -> Any:
         the target; each as from ``list_occupied``.
     """
     target, valid, pose, space = inputs[0], inputs[2][0], inputs[3], inputs[4]
-    cells = list_occupied(space, pose[0], pose[1], reach_m, (0.0, 0.0, -1.0))
+    cells = list_occupied(space, pose[0], pose[1], reach_m)
     radius = SOURCE_CLEARANCE_M if valid > 0.5 else -1.0
     return split_at_disc(cells, (target[0], target[1]), radius)
 

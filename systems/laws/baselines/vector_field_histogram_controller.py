@@ -123,21 +123,21 @@ def _mask(
     circle block the right side.
     """
     x, y, theta = pose
+    # From the robot to the center of the left circle.
+    cx, cy = -circle * math.sin(theta), circle * math.cos(theta)
     left = right = math.pi
     for n in range(len(places)):
         dx, dy = places[n, 0] - x, places[n, 1] - y
         if math.hypot(dx, dy) > numbers.window_m:
             continue
-        off = wrapped(math.atan2(dy, dx) - theta)
-        # The centers of the circles are to the left and to the right of the robot.
-        for side in (1.0, -1.0):
-            cx = -side * circle * math.sin(theta)
-            cy = side * circle * math.cos(theta)
-            if math.hypot(dx - cx, dy - cy) < circle + numbers.radius_m:
-                if side > 0.0 and off > 0.0:
-                    left = min(left, off)
-                if side < 0.0 and off < 0.0:
-                    right = min(right, -off)
+        on_left = math.hypot(dx - cx, dy - cy) < circle + numbers.radius_m
+        on_right = math.hypot(dx + cx, dy + cy) < circle + numbers.radius_m
+        if on_left or on_right:
+            off = wrapped(math.atan2(dy, dx) - theta)
+            if on_left and off > 0.0:
+                left = min(left, off)
+            if on_right and off < 0.0:
+                right = min(right, -off)
     for k in range(_SECTORS):
         off = wrapped(k * math.tau / _SECTORS - theta)
         if off > left or off < -right:
