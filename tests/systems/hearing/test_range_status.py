@@ -27,8 +27,6 @@ from systems.hearing.spherical_interpolation import near_or_far
 from systems.hearing.tdoa_estimator import TDOAEstimator
 from systems.sound.array_shape import ArrayShape
 
-pytestmark = pytest.mark.drake
-
 FS, N, C = 100_000.0, 2500, 340.0
 ROW = np.array([[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]])
 CROSS = np.array([[0.0, 0.0], [0.25, 0.0], [0.0, 0.25], [-0.25, 0.0], [0.0, -0.25]])
@@ -73,16 +71,19 @@ class Ears:
         return status
 
 
+@pytest.mark.drake
 def test_before_the_first_frame_nothing_is_heard():
     assert Ears().read("range_status") == NOTHING_HEARD
 
 
+@pytest.mark.drake
 def test_a_sound_that_ends_is_heard_no_longer():
     ears = Ears()
     assert ears.hear(sound_at(1.5, 0.5)) == RANGED
     assert ears.hear(0.1 * noise(1)) == NOTHING_HEARD
 
 
+@pytest.mark.drake
 def test_a_silent_channel_is_no_sound():
     """The estimator then remembers the last frame, which had a sound."""
     ears, rows = Ears(), sound_at(1.5, 0.5)
@@ -91,11 +92,13 @@ def test_a_silent_channel_is_no_sound():
     assert ears.hear(rows) == NOTHING_HEARD
 
 
+@pytest.mark.drake
 def test_a_plane_wave():
     """Curved the wrong way: the middle microphone hears it late."""
     assert Ears().hear(sound_with([0.0, 2e-4, 2e-4])) == PLANE_WAVE
 
 
+@pytest.mark.drake
 def test_delays_that_no_place_has():
     """From the second microphone to the third it takes 3 mm more than their distance.
 
@@ -104,16 +107,19 @@ def test_delays_that_no_place_has():
     assert Ears().hear(sound_with([0.0, -0.2 / C, 0.203 / C])) == NO_PLACE
 
 
+@pytest.mark.drake
 def test_a_range_that_is_too_uncertain(monkeypatch):
     monkeypatch.setattr(localize, "_LARGEST_RANGE_STD", 1e-5)
     assert Ears().hear(sound_at(1.5, 0.5)) == UNCERTAIN
 
 
+@pytest.mark.drake
 def test_a_source_too_near_is_rejected():
     assert Ears().hear(sound_at(0.1, 0.0)) == REJECTED
     assert Ears().hear(sound_at(0.4, 0.0)) == RANGED
 
 
+@pytest.mark.drake
 def test_an_estimate_too_uncertain_is_rejected(monkeypatch):
     monkeypatch.setattr(localize, "_LARGEST_BEARING_STD", 1e-8)
     assert Ears().hear(sound_at(1.5, 0.5)) == REJECTED
@@ -182,7 +188,9 @@ def test_too_few_microphones_come_before_everything_else():
     assert range_status(0.5, 0.9, 1.0) == RANGED
 
 
-@pytest.mark.parametrize("engine", ["drake", "compiled"])
+@pytest.mark.parametrize(
+    "engine", [pytest.param("drake", marks=pytest.mark.drake), "compiled"]
+)
 @pytest.mark.parametrize("hearing", ["ideal", "audio"])
 def test_the_table_says_why(engine, hearing):
     changes = {"hearing": hearing, "engine": engine, "duration_s": 2.5}

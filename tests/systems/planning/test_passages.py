@@ -114,7 +114,6 @@ def test_occupied_points_are_fine_cells_that_were_not_seen_free():
     }
 
 
-@pytest.mark.drake
 def test_a_long_body_passes_a_gap_that_is_narrower_than_its_disc():
     """The gap is 0.75 m wide, the body 0.6 m, and its disc 1.34 m."""
     wall = {"size_m": [1.0, 20.0]}
