@@ -30,11 +30,12 @@ from systems.planning.following import (
 from systems.planning.route_approach import (
     Approach,
     RouteNumbers,
+    RouteState,
     approach_on_route,
     route_numbers,
+    route_state,
 )
 from systems.planning.turning import turn_rate, wrapped
-from systems.planning.way import Way, make_way
 from systems.safety.parameters import GuardParameters
 
 #: Half side of the window of the distance field, m. A sequence stays within it.
@@ -95,8 +96,7 @@ class PathIntegralState(NamedTuple):
 
     plan: NDArray[np.float64]
     """(steps, 2) speed, m/s, and yaw rate, rad/s, of each step."""
-    way: Way
-    """Route to the target."""
+    route: RouteState
 
 
 @njit(cache=True)
@@ -267,13 +267,13 @@ def path_integral_step(
     steps = len(plan)
     if tick % numbers.period_ticks == 0:
         controls = np.zeros((steps, 2))
-        approach = approach_on_route(tick, inputs, state.way, numbers.route)
+        approach = approach_on_route(tick, inputs, state.route, numbers.route)
         at = pose[0], pose[1], pose[2]
         places = np.concatenate(occupied_around(inputs, _WINDOW_M))
         turn = _turn_first(places, at, approach, numbers.wide)
         if turn != 0.0:
             controls[0, 1] = turn
-        else:
+        elif approach.speed_m_s != 0.0:
             # Start from the remaining steps of the last plan, and repeat its last step.
             for k in range(steps):
                 last = min(k + 1, steps - 1)
@@ -380,8 +380,8 @@ class PathIntegralController(MapController):
             max(round(_STEP_S / tick_s), 1),
             _noise(seed),
         )
-        way = make_way(guard.cells_for(body_radius(robot)))
-        state = PathIntegralState(np.zeros((_STEPS, 2)), way)
+        route = route_state(guard.cells_for(body_radius(robot)))
+        state = PathIntegralState(np.zeros((_STEPS, 2)), route)
         self.declare(Step(path_integral_step, numbers, state), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
