@@ -21,7 +21,7 @@ from systems.planning.way import FREE, TIGHT, Way, find_way, make_way
 
 #: Time between two plans, s.
 _REPLAN_S = 0.5
-#: Price of an unknown cell: about five times that of a free cell, as in NavFn of ROS.
+#: Price of an unknown cell: five times that of a free cell (NavFn of ROS: 253 and 50).
 _UNKNOWN = 5 * FREE
 #: Largest distance of the local goal, m.
 _LOOK_AHEAD_M = 1.5
@@ -129,8 +129,8 @@ def approach_on_route(
     last = way.path[way.points[0] - 1]
     there = math.hypot(gx - target[0], gy - target[1]) < SOURCE_CLEARANCE_M
     there = there and gx == last[0] and gy == last[1]
-    level = way.dearest[0] <= TIGHT and length < _DETOUR * direct
-    if there or (level and direct < _LOOK_AHEAD_M):
+    is_straight = way.dearest[0] <= TIGHT and length < _DETOUR * direct
+    if there or (is_straight and direct < _LOOK_AHEAD_M):
         gx, gy, left = target[0], target[1], straight - follow.distance_m
         reach = max(left, 0.0)
     slow = math.hypot(velocity[0], velocity[1]) < _RESTS_M_S

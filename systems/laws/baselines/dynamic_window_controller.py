@@ -263,8 +263,8 @@ def _wanted_speeds(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Returns the least and the wanted speed, m/s.
 
-    The robot may back off to get away from obstacles. If the
-    local goal is far off its heading, it turns before it drives.
+    The robot may back off to get away from obstacles. If the local goal is far off its
+    heading, it turns before it drives.
     """
     wanted, least = approach.speed_m_s, SPEED_LIMITS[0]
     if wanted < 0.0:
@@ -318,6 +318,7 @@ class DynamicWindowController(MapController):
     - The way to brake contains the way of one period and of the motors' lag.
     - The distance along an arc counts up to half a circle and up to the local goal, so
       that circles do not count as long ways.
+    - A robot that has arrived brakes to rest.
     - The obstacles are cells of a map instead of lines. A cell is occupied if an echo
       came from it and no sensor has seen it free since.
 

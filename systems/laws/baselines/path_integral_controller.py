@@ -370,11 +370,12 @@ class PathIntegralController(MapController):
        the robot first turns on the spot, as with the rotation shim of Nav2.
     2. It draws 500 random sequences of 2.5 s around the previous plan, and computes the
        cost of each. The cost depends on the distance and direction of the goal, on
-       driving backward, and on occupied cells near the body.
+       driving backward, on occupied cells near the outline of the body, and on unseen
+       floor under it.
     3. The new plan is the mean of the sequences, weighted with exp(-cost/temperature).
 
-    The state contains the plan and the memory of the route planner. There is no
-    latency.
+    A robot that has arrived stops. The state contains the plan and the memory of the
+    route planner. There is no latency.
 
     Args:
         robot: Size of the body, and position of the control point P ahead of the axle.
