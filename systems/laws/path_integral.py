@@ -19,8 +19,8 @@ class PathIntegralParameters(Parameters):
     controller in Nav2.
     """
 
-    clearance_m: NonNegativeLength = 0.03
-    """Distance that the robot keeps from cells with echoes, m."""
+    clearance_m: NonNegativeLength = 0.05
+    """Distance that the robot keeps from cells with echoes, m (one cell of the map)."""
     turn_spread_rad_s: Positive = 1.1
     """Standard deviation of the sampled yaw rates, rad/s."""
     temperature: Positive = 0.37

@@ -116,6 +116,7 @@ def find_way(
     time: float,
     widths: Any,
     clear: Any,
+    unknown: int = UNKNOWN,
 ) -> None:  # pragma: no cover  (compiled)
     """Finds the cheapest route from the robot to a goal.
 
@@ -135,12 +136,13 @@ def find_way(
             that contains the body, both with margins, m.
         clear: (n, 3) positions (x, y) and radii, m. Hits within these radii do not
             block the route, because they come from the target or from a moving body.
+        unknown: Price of an unknown cell.
     """
     size, cell, low = way.price.shape[0], 2.0 * space.cell_m, way.low
     way.cell_m[0] = cell
     for axis in range(2):
         low[axis] = (space.first[axis] + 1) // 2
-    _set_prices(way, space, time, widths, clear)
+    _set_prices(way, space, time, widths, clear, unknown)
     si, sj = cell_at(way, start[0], start[1])
     gi, gj = cell_at(way, goal[0], goal[1])
     _search(way, si * size + sj, gi * size + gj)
@@ -192,7 +194,7 @@ def cell_at(
 
 @njit(cache=True)
 def _set_prices(
-    way: Way, space: FreeSpace, time: float, widths: Any, clear: Any
+    way: Way, space: FreeSpace, time: float, widths: Any, clear: Any, unknown: int
 ) -> None:  # pragma: no cover  (compiled)
     """Sets the price of each cell from free space, hits, and marks.
 
@@ -210,7 +212,7 @@ def _set_prices(
         for j in range(2 * size):
             at = (2 * low[0] + i) % cells, (2 * low[1] + j) % cells
             if space.free_until[at] == NEVER:
-                way.price[i // 2, j // 2] = max(way.price[i // 2, j // 2], UNKNOWN)
+                way.price[i // 2, j // 2] = max(way.price[i // 2, j // 2], unknown)
             hits = space.hits[at]
             if hits < _DOUBTFUL_HITS:
                 continue

@@ -117,12 +117,40 @@ def test_the_source_is_reached_and_not_touched(law, follow):
         assert far < follow + 0.3
 
 
-def test_a_desk_before_the_robot_is_left():
-    """The front is 0.2 m before the desk. Three cones do not see the desk's ends."""
-    desk = box("desk", 0.475, 0.0, 0.2, 1.4)
-    run = ended("dwa", (4.0, 0.0), [desk], **LIDAR)
+@pytest.mark.parametrize("sensors", [LIDAR, {}])
+@pytest.mark.parametrize("aside", [0.0, 0.6])
+def test_a_desk_before_the_robot_is_left(sensors, aside):
+    """The front is 0.2 m before the desk, or before its end (kobuki-x, issue 33)."""
+    desk = box("desk", 0.475, aside, 0.2, 1.4)
+    assert ended("dwa", (4.0, 0.0), [desk], **sensors).cause == "reached"
+
+
+@pytest.mark.parametrize("law", ["dwa", "mppi"])
+@pytest.mark.parametrize("x", [4.0, -4.0])
+def test_a_corridor_in_which_the_body_can_turn_is_enough(law, x):
+    """1.2 m wide; the diagonal of the body is 0.89 m (Nav2, issue 4049)."""
+    walls = [box("l", 0.0, 0.65, 14.0, 0.1), box("r", 0.0, -0.65, 14.0, 0.1)]
+    assert ended(law, (x, 0.0), walls, duration_s=60.0).cause == "reached"
+
+
+@pytest.mark.parametrize("law", ["dwa", "mppi"])
+def test_who_has_arrived_stands_until_the_source_leaves(law):
+    """For 10 s it moves by less than 1 cm; the source then leaves with 0.3 m/s."""
+    run = ended(
+        law,
+        (3.0, 1.0),
+        **{
+            "source.waypoints_m": [[3.0, 1.0], [3.01, 1.0], [7.0, 1.0]],
+            "source.start_time_s": 20.0,
+            "source.speed_m_s": 0.3,
+            "duration_s": 35.0,
+        },
+    )
     assert run.collision is None
-    assert np.abs(run.columns["p_WB_y"]).max() > 0.5
+    times, place = np.arange(len(run.columns["p_WP_x"])) * 0.025, run.columns["p_WP_x"]
+    still = place[(times > 10.0) & (times < 20.0)]
+    assert np.ptp(still) < 0.01
+    assert place[-1] > still[-1] + 1.0
 
 
 @pytest.mark.parametrize("source", [(1.7, -1.7), (1.8, 1.8), (-1.9, 0.3)])

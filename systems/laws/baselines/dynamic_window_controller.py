@@ -26,11 +26,12 @@ from systems.planning.following import SPEED_LIMITS, FollowNumbers
 from systems.planning.route_approach import (
     Approach,
     RouteNumbers,
+    RouteState,
     approach_on_route,
     route_numbers,
+    route_state,
 )
 from systems.planning.turning import slowed_by, wrapped
-from systems.planning.way import Way, make_way
 from systems.safety.parameters import GuardParameters
 
 # ``_SPEEDS``: number of speeds in the grid over a window.
@@ -77,8 +78,7 @@ class DynamicWindowState(NamedTuple):
 
     motion: NDArray[np.float64]
     """(2,) chosen speed, m/s, and yaw rate, rad/s."""
-    way: Way
-    """Route to the target."""
+    route: RouteState
 
 
 @njit(cache=True)
@@ -118,9 +118,10 @@ def _time_to_stop(
 
 @njit(cache=True)
 def _braked(
-    now: tuple[float, float], dv: float, dw: float
+    now: tuple[float, float],
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Returns the slowest motion of the window on the present arc."""
+    dv, dw = _ACCELERATION_M_S2 * _PERIOD_S, _TURN_ACCELERATION_RAD_S2 * _PERIOD_S
     kept = 0.0
     if abs(now[0]) > dv:
         kept = 1.0 - dv / abs(now[0])
@@ -194,7 +195,7 @@ def choose_in_window(
             values[i, j] = 0.0
             if contact >= _time_to_stop((v, w), now, numbers):
                 values[i, j] = _value((v, w), contact, pose, wanted, goal, numbers)
-    found, best = _braked(now, dv, dw), 0.0
+    found, best = _braked(now), 0.0
     for i in range(_SPEEDS):
         for j in range(_TURNS):
             if values[i, j] > 0.0:
@@ -262,11 +263,11 @@ def _wanted_speeds(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Returns the least and the wanted speed, m/s.
 
-    The robot may back off to get away from obstacles, but not if it has arrived. If the
-    local goal is far off its heading, it turns before it drives.
+    The robot may back off to get away from obstacles. If the local goal is far off its
+    heading, it turns before it drives.
     """
     wanted, least = approach.speed_m_s, SPEED_LIMITS[0]
-    if wanted <= 0.0:
+    if wanted < 0.0:
         return wanted, wanted
     bearing = math.atan2(approach.y - pose[1], approach.x - pose[0])
     return least, slowed_by(wrapped(bearing - pose[2]), wanted)
@@ -283,14 +284,17 @@ def dynamic_window_step(
     """Computes speed and yaw rate of the robot for one control period."""
     pose, motion = inputs[3], state.motion
     if tick % numbers.period_ticks == 0:
-        approach = approach_on_route(tick, inputs, state.way, numbers.route)
+        approach = approach_on_route(tick, inputs, state.route, numbers.route)
         cells = occupied_around(inputs, _REACH_M)
         now, at = (motion[0], motion[1]), (pose[0], pose[1], pose[2])
         goal = approach.x, approach.y, approach.reach_m
-        speeds = _wanted_speeds(at, approach)
-        motion[0], motion[1] = choose_in_window(
-            cells, at, now, speeds, goal, numbers.window
-        )
+        if approach.speed_m_s == 0.0:
+            motion[0], motion[1] = _braked(now)
+        else:
+            speeds = _wanted_speeds(at, approach)
+            motion[0], motion[1] = choose_in_window(
+                cells, at, now, speeds, goal, numbers.window
+            )
     outputs[0][0], outputs[0][1] = motion[0], motion[1]
 
 
@@ -314,6 +318,7 @@ class DynamicWindowController(MapController):
     - The way to brake contains the way of one period and of the motors' lag.
     - The distance along an arc counts up to half a circle and up to the local goal, so
       that circles do not count as long ways.
+    - A robot that has arrived brakes to rest.
     - The obstacles are cells of a map instead of lines. A cell is occupied if an echo
       came from it and no sensor has seen it free since.
 
@@ -358,6 +363,6 @@ class DynamicWindowController(MapController):
             route_numbers(follow, body[1] + gains.clearance_m, tick_s),
             max(round(_PERIOD_S / tick_s), 1),
         )
-        way = make_way(guard.cells_for(body_radius(robot)))
-        state = DynamicWindowState(np.zeros(2), way)
+        route = route_state(guard.cells_for(body_radius(robot)))
+        state = DynamicWindowState(np.zeros(2), route)
         self.declare(Step(dynamic_window_step, numbers, state), tick_s=tick_s)

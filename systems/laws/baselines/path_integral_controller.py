@@ -30,11 +30,13 @@ from systems.planning.following import (
 from systems.planning.route_approach import (
     Approach,
     RouteNumbers,
+    RouteState,
     approach_on_route,
     route_numbers,
+    route_state,
 )
 from systems.planning.turning import turn_rate, wrapped
-from systems.planning.way import Way, make_way
+from systems.safety.free_space import FreeSpace, cell_is_free
 from systems.safety.parameters import GuardParameters
 
 #: Half side of the window of the distance field, m. A sequence stays within it.
@@ -59,6 +61,8 @@ _COLLISION_COST = 1_000.0
 #: If the local goal is farther off the heading than this angle, rad, the robot first
 #: turns on the spot, as with the rotation shim controller of Nav2 (there: 0.785).
 _TURN_FIRST_RAD = 0.785
+#: Greatest distance between two points of the outline of the body, m.
+_APART_M = 0.1
 #: Length of a step to a diagonal neighbor, in cells.
 _ACROSS = math.sqrt(2.0)
 
@@ -71,10 +75,10 @@ class RollNumbers(NamedTuple):
     angle_gain: float
     obstacle_gain: float
     inflation_m: float
-    discs: NDArray[np.float64]
-    """(n, 2) middles of the discs that cover the body, in the body frame B, m."""
-    radius_m: float
-    """Radius of every disc, including the clearance, m."""
+    outline: NDArray[np.float64]
+    """(n, 2) points of the outline of the body, in the body frame B, m."""
+    clearance_m: float
+    """Distance that these points keep from occupied cells, m."""
     control_point_m: float
 
 
@@ -95,8 +99,7 @@ class PathIntegralState(NamedTuple):
 
     plan: NDArray[np.float64]
     """(steps, 2) speed, m/s, and yaw rate, rad/s, of each step."""
-    way: Way
-    """Route to the target."""
+    route: RouteState
 
 
 @njit(cache=True)
@@ -144,6 +147,32 @@ def distance_field(
                             best = min(best, field[i - sign, k] + _ACROSS * cell)
                 field[i, j] = best
     return field
+
+
+@njit(cache=True)
+def price_unseen(
+    field: Any, space: FreeSpace, x: float, y: float, numbers: RollNumbers
+) -> None:  # pragma: no cover  (compiled)
+    """Lets cells that no sensor has seen cost as much as cells near an obstacle.
+
+    The function limits the distance of these cells to the clearance and the inflation.
+    The body may enter them, but prefers floor that was seen free.
+
+    Args:
+        field: (m, m) result of ``distance_field`` around (x, y), m; changed in place.
+        space: Map of free space.
+        x: Center of the window, x in the world frame W, m.
+        y: Center of the window, y in W, m.
+        numbers: Clearance and inflation.
+    """
+    cell, size = space.cell_m, len(field)
+    near = numbers.clearance_m + numbers.inflation_m
+    for i in range(size):
+        a = math.floor(x / cell + i + 0.5 - 0.5 * size)
+        for j in range(size):
+            b = math.floor(y / cell + j + 0.5 - 0.5 * size)
+            if not cell_is_free(space, a, b, 0.0):
+                field[i, j] = min(field[i, j], near)
 
 
 @njit(cache=True)
@@ -224,14 +253,14 @@ def _cost(
         theta += 0.5 * w * dt
         c, s = math.cos(theta), math.sin(theta)
         x, y, theta = x + v * dt * c, y + v * dt * s, theta + 0.5 * w * dt
-        # Clearance of the discs. Cells outside the window count as free.
+        # Clearance of the outline. Cells outside the window count as free.
         nearest = np.inf
-        for d in range(len(numbers.discs)):
-            along, aside = numbers.discs[d, 0], numbers.discs[d, 1]
+        for n in range(len(numbers.outline)):
+            along, aside = numbers.outline[n, 0], numbers.outline[n, 1]
             i = math.floor((x + along * c - aside * s) / cell + half)
             j = math.floor((y + along * s + aside * c) / cell + half)
             if 0 <= i < len(field) and 0 <= j < len(field):
-                nearest = min(nearest, field[i, j] - numbers.radius_m)
+                nearest = min(nearest, field[i, j] - numbers.clearance_m)
         cost = max(-v, 0.0) * _FORWARD_GAIN
         if nearest < 0.0:
             cost += _COLLISION_COST
@@ -267,13 +296,13 @@ def path_integral_step(
     steps = len(plan)
     if tick % numbers.period_ticks == 0:
         controls = np.zeros((steps, 2))
-        approach = approach_on_route(tick, inputs, state.way, numbers.route)
+        approach = approach_on_route(tick, inputs, state.route, numbers.route)
         at = pose[0], pose[1], pose[2]
         places = np.concatenate(occupied_around(inputs, _WINDOW_M))
         turn = _turn_first(places, at, approach, numbers.wide)
         if turn != 0.0:
             controls[0, 1] = turn
-        else:
+        elif approach.speed_m_s != 0.0:
             # Start from the remaining steps of the last plan, and repeat its last step.
             for k in range(steps):
                 last = min(k + 1, steps - 1)
@@ -281,6 +310,7 @@ def path_integral_step(
             goal = _goal(at, approach, numbers.route.follow)
             cell = space.cell_m
             field = distance_field(places, at[0], at[1], _WINDOW_M, cell)
+            price_unseen(field, space, at[0], at[1], numbers.roll)
             noise = numbers.noise[tick // numbers.period_ticks % _ROUNDS]
             roll_out(controls, noise, at, goal, field, cell, numbers.roll)
         for k in range(steps):
@@ -340,11 +370,12 @@ class PathIntegralController(MapController):
        the robot first turns on the spot, as with the rotation shim of Nav2.
     2. It draws 500 random sequences of 2.5 s around the previous plan, and computes the
        cost of each. The cost depends on the distance and direction of the goal, on
-       driving backward, and on occupied cells near the body.
+       driving backward, on occupied cells near the outline of the body, and on unseen
+       floor under it.
     3. The new plan is the mean of the sequences, weighted with exp(-cost/temperature).
 
-    The state contains the plan and the memory of the route planner. There is no
-    latency.
+    A robot that has arrived stops. The state contains the plan and the memory of the
+    route planner. There is no latency.
 
     Args:
         robot: Size of the body, and position of the control point P ahead of the axle.
@@ -380,8 +411,8 @@ class PathIntegralController(MapController):
             max(round(_STEP_S / tick_s), 1),
             _noise(seed),
         )
-        way = make_way(guard.cells_for(body_radius(robot)))
-        state = PathIntegralState(np.zeros((_STEPS, 2)), way)
+        route = route_state(guard.cells_for(body_radius(robot)))
+        state = PathIntegralState(np.zeros((_STEPS, 2)), route)
         self.declare(Step(path_integral_step, numbers, state), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
@@ -392,41 +423,36 @@ class PathIntegralController(MapController):
 
 
 def _roll_numbers(gains: PathIntegralParameters, robot: RobotParameters) -> RollNumbers:
-    discs, radius = covering_discs(*half_size(robot))
     return RollNumbers(
         gains.turn_spread_rad_s,
         gains.temperature,
         gains.angle_gain,
         gains.obstacle_gain,
         gains.inflation_m,
-        discs,
-        radius + gains.clearance_m,
+        outline_points(*half_size(robot)),
+        gains.clearance_m,
         robot.control_point_m,
     )
 
 
-def covering_discs(
-    half_length: float, half_width: float
-) -> tuple[NDArray[np.float64], float]:
-    """Covers a rectangle by equal discs in a row along its longer side.
-
-    The discs extend beyond the sides by at most 6 % of the shorter side.
+def outline_points(half_length: float, half_width: float) -> NDArray[np.float64]:
+    """Places points on the outline of a rectangle, at most ``_APART_M`` apart.
 
     Args:
         half_length: Half of the extent along x, m.
         half_width: Half of the extent along y, m.
 
     Returns:
-        (n, 2) middles of the discs, m, relative to the middle of the rectangle, and the
-        radius of the discs, m.
+        (n, 2) points relative to the middle of the rectangle, m. The corners are among
+        them.
     """
-    longer, shorter = max(half_length, half_width), min(half_length, half_width)
-    count = math.ceil(2.0 * longer / shorter)
-    part = longer / count
-    row = part * (2.0 * np.arange(count) - count + 1.0)
-    discs = np.zeros((count, 2))
-    discs[:, 0 if half_length >= half_width else 1] = row
-    return discs, math.hypot(part, shorter)
+    half = half_length, half_width
+    along, aside = (
+        np.linspace(-side, side, math.ceil(2.0 * side / _APART_M) + 1) for side in half
+    )
+    points = [(x, y) for x in along for y in (-half_width, half_width)]
+    points += [(x, y) for x in (-half_length, half_length) for y in aside[1:-1]]
+    return np.array(points)
 
 
 def _noise(seed: int) -> NDArray[np.float64]:

@@ -10,12 +10,14 @@ from systems.base.robot import RobotParameters
 from systems.laws.baselines.path_integral_controller import (
     _roll_numbers,
     _turn_first,
-    covering_discs,
     distance_field,
+    outline_points,
+    price_unseen,
     roll_out,
 )
 from systems.laws.path_integral import PathIntegralParameters
 from systems.planning.route_approach import Approach
+from systems.safety.free_space import make_free_space
 
 CELL_M = 0.05
 START = 0.0, 0.0, 0.0
@@ -101,14 +103,35 @@ def test_it_does_not_drive_into_a_wall():
 
 
 @pytest.mark.parametrize("half", [(0.175, 0.41), (0.6, 0.25), (0.25, 0.25), (0.1, 0.7)])
-def test_discs_cover_the_body_and_little_more(half):
-    """Each point is in a disc, and the discs are at most 12 % wider than the body."""
-    discs, radius = covering_discs(*half)
-    grid = np.meshgrid(*(side * np.linspace(-1.0, 1.0, 41) for side in half))
-    points = np.column_stack([axis.ravel() for axis in grid])
-    far = np.linalg.norm(points[:, None] - discs[None], axis=2).min(axis=1)
-    assert (far <= radius + 1e-9).all()
-    assert radius <= 1.12 * min(half)
+def test_points_are_on_the_outline_and_near_each_other(half):
+    """Walking the four sides, the next point is at most 0.05 m away."""
+    points = outline_points(*half)
+    share = np.abs(points) / half
+    assert (share <= 1.0).all()
+    np.testing.assert_allclose(share.max(axis=1), 1.0)
+    for axis in range(2):
+        side = np.linspace(-half[1 - axis], half[1 - axis], 101)
+        for sign in (-1.0, 1.0):
+            walk = np.full((101, 2), sign * half[axis])
+            walk[:, 1 - axis] = side
+            far = np.linalg.norm(walk[:, None] - points[None], axis=2).min(axis=1)
+            assert far.max() <= 0.05 + 1e-9
+
+
+def test_unseen_floor_costs_as_much_as_floor_near_an_obstacle():
+    """One inflation length beyond the clearance, wherever nothing was seen free."""
+    space = make_free_space(200, CELL_M, 1, 2)
+    space.free_until[:20] = np.inf  # x from 0 to 1 m
+    numbers = _roll_numbers(PathIntegralParameters(), RobotParameters())
+    field = distance_field(np.array([[2.025, 0.025, 1.0]]), 0.025, 0.025, 2.5, CELL_M)
+    before = field.copy()
+    price_unseen(field, space, 0.025, 0.025, numbers)
+    free = slice(50, 70)
+    np.testing.assert_array_equal(field[free], before[free])
+    unseen = np.delete(field, free, axis=0)
+    limit = numbers.clearance_m + numbers.inflation_m
+    assert unseen.max() == pytest.approx(limit)
+    assert unseen.min() == 0.0
 
 
 def test_it_turns_on_the_spot_to_what_is_behind_it():
