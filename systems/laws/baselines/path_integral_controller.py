@@ -115,7 +115,8 @@ def distance_field(
 
     Args:
         places: (n, 3) occupied cells: x and y of the middle in the world frame W, m,
-            and the certainty, 0 to 1 (not used).
+            and the distance that the cell itself gets, m: 0, or more if the body may
+            come nearer to this cell than to others.
         x: Center of the window, x in W, m.
         y: Center of the window, y in W, m.
         half: Half of the side of the window, m.
@@ -131,7 +132,7 @@ def distance_field(
         i = math.floor((places[n, 0] - x) / cell + 0.5 * size)
         j = math.floor((places[n, 1] - y) / cell + 0.5 * size)
         if 0 <= i < size and 0 <= j < size:
-            field[i, j] = 0.0
+            field[i, j] = min(field[i, j], places[n, 2])
     for sign in (1, -1):
         order = range(size) if sign > 0 else range(size - 1, -1, -1)
         for i in order:
@@ -298,7 +299,10 @@ def path_integral_step(
         controls = np.zeros((steps, 2))
         approach = approach_on_route(tick, inputs, state.route, numbers.route)
         at = pose[0], pose[1], pose[2]
-        places = np.concatenate(occupied_around(inputs, _WINDOW_M))
+        others, followed = occupied_around(inputs, _WINDOW_M)
+        # The follow distance is the clearance from the target.
+        others[:, 2], followed[:, 2] = 0.0, numbers.roll.clearance_m
+        places = np.concatenate((others, followed))
         turn = _turn_first(places, at, approach, numbers.wide)
         if turn != 0.0:
             controls[0, 1] = turn

@@ -25,7 +25,7 @@ START = 0.0, 0.0, 0.0
 
 def test_distances_are_at_most_a_twelfth_too_long():
     random = np.random.default_rng(1)
-    places = np.column_stack([random.uniform(-2.0, 2.0, (30, 2)), np.ones(30)])
+    places = np.column_stack([random.uniform(-2.0, 2.0, (30, 2)), np.zeros(30)])
     field = distance_field(places, 0.0, 0.0, 2.0, CELL_M)
     exact = distance_transform_edt(field > 0.0) * CELL_M
     assert len(field) == 81
@@ -34,9 +34,17 @@ def test_distances_are_at_most_a_twelfth_too_long():
 
 
 def test_places_are_where_they_are():
-    field = distance_field(np.array([[3.5, -1.0, 1.0]]), 3.0, -1.0, 2.0, CELL_M)
+    field = distance_field(np.array([[3.5, -1.0, 0.0]]), 3.0, -1.0, 2.0, CELL_M)
     assert np.argwhere(field == 0.0).tolist() == [[50, 40]]
     assert (distance_field(np.empty((0, 3)), 0.0, 0.0, 1.0, CELL_M) > 1e5).all()
+
+
+def test_a_cell_of_the_target_counts_as_farther_away():
+    places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.05], [1.0, 0.0, 0.3]])
+    field = distance_field(places, 0.0, 0.0, 2.0, CELL_M)
+    np.testing.assert_allclose(
+        field[[40, 50, 58, 60, 62], 40], [0, 0.5, 0.15, 0.05, 0.15]
+    )
 
 
 def rolled(own, noise, goal, *, field=None, rounds=1):
@@ -92,7 +100,7 @@ def test_it_goes_to_where_the_goal_will_be():
 def test_it_does_not_drive_into_a_wall():
     own = PathIntegralParameters(temperature=0.02)
     noise = np.random.default_rng(4).standard_normal((10, 400, 25, 2))
-    wall = np.array([(0.6, 0.05 * k, 1.0) for k in range(-60, 61)])
+    wall = np.array([(0.6, 0.05 * k, 0.0) for k in range(-60, 61)])
     field = distance_field(wall, 0.0, 0.0, 2.5, CELL_M)
     goal = 2.0, 0.0, 0.0, 0.0
     free = rolled(own, noise, goal, rounds=10)
@@ -123,7 +131,7 @@ def test_unseen_floor_costs_as_much_as_floor_near_an_obstacle():
     space = make_free_space(200, CELL_M, 1, 2)
     space.free_until[:20] = np.inf  # x from 0 to 1 m
     numbers = _roll_numbers(PathIntegralParameters(), RobotParameters())
-    field = distance_field(np.array([[2.025, 0.025, 1.0]]), 0.025, 0.025, 2.5, CELL_M)
+    field = distance_field(np.array([[2.025, 0.025, 0.0]]), 0.025, 0.025, 2.5, CELL_M)
     before = field.copy()
     price_unseen(field, space, 0.025, 0.025, numbers)
     free = slice(50, 70)
