@@ -148,7 +148,8 @@ class GuardedController(Block):
         creep = 0.0
         if is_long(outline):
             # Echoes seem to come from up to one cell in front of a wall.
-            creep, narrow = _CREEP_SHARE * CREEP_M_S, narrow - guard.cell_m
+            rest = CREEP_M_S if guard.obstacle_speed_m_s else CRUISE_SPEED_M_S
+            creep, narrow = _CREEP_SHARE * rest, narrow - guard.cell_m
         widest = 2.0 * (disc + margin)
         if guard.obstacle_speed_m_s == 0.0:
             widest = min(widest, _WIDE * robot.width_m)
