@@ -97,13 +97,13 @@ def lines_up(
     half_length = half_size[0]
     x, y, theta = pose[0], pose[1], pose[2]
     along, aside = front_error(p, pose, half_length)
-    if along < -p.half_m[0] - (APPROACH + _EARLIER) * half_length:
+    if along < -p.half_m[0] - (APPROACH + _EARLIER - 1.0) * half_length:
         return False
     for _ in range(_MOST_STEPS):
         now = x, y, theta
         along, aside = front_error(p, now, half_length)
         error = along_axis(p, now, half_length)
-        if along >= -p.half_m[0]:
+        if along >= half_length - p.half_m[0]:
             off = abs(wrapped(p.axis[0] - theta))
             return off < _LINED_UP_RAD and abs(aside) < _LINED_UP * half_size[1]
         if abs(error) > _MOST_ERROR_RAD:

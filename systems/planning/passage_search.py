@@ -204,7 +204,7 @@ def place_approach(
 ) -> None:  # pragma: no cover  (compiled)
     """Places the axle so that its front is on the axis and the disc is clear."""
     best = -np.inf
-    back = p.half_m[0] + APPROACH * half_length
+    back = p.half_m[0] + (APPROACH - 1.0) * half_length
     c, s = math.cos(p.axis[0]), math.sin(p.axis[0])
     fx, fy = p.middle[0] - back * c, p.middle[1] - back * s
     for slant in _SLANTS:
