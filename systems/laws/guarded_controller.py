@@ -30,7 +30,8 @@ from systems.safety.views import range_errors
 _CLEARANCE_M = 0.02
 #: Share of the top speed at which a fast robot drives. The rest is left for turns.
 _CRUISE_SHARE = 0.86
-#: Share of the largest speed that counts as rest at which a long body passes.
+#: Share at which a long body passes: of the largest speed that counts as rest, or, if
+#: all obstacles are at rest, of the speed of a small robot.
 _CREEP_SHARE = 0.96
 #: Width of a passage that a long body passes without lining up if all obstacles are at
 #: rest, as a multiple of its width.

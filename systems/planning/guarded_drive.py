@@ -226,8 +226,8 @@ def _drive(  # type: ignore[no-untyped-def]
         m.speed[0], m.turn[0] = wanted, 0.5 * TURN_GAIN * error
         return
     weave = 0.0
-    if wanted > 0.0 and numbers.creep_m_s == 0.0:
-        width, period = _WEAVE_RAD, _WEAVE_S
+    if wanted > 0.0:
+        width, period = _WEAVE_RAD if numbers.creep_m_s == 0.0 else 0.0, _WEAVE_S
         moves = math.hypot(velocity[0], velocity[1]) > RESTS_M_S
         narrow = state.way.dearest[0] >= NEAR
         recent = time - state.hazards.moved_s[0] < _MOVES_S

@@ -184,8 +184,7 @@ def drive_in_passage(
 ) -> None:
     """Computes the twist of a robot that passes, backs out, or leaves.
 
-    All points of the body are slow enough that the motion counts as rest. While the
-    robot passes, the middle of its front moves in the wanted direction, so that the
+    No point of the body is faster than ``creep_m_s``. While the robot passes, the middle of its front moves in the wanted direction, so that the
     body comes in line behind it. While it leaves, it turns only so fast that no corner
     of its rear comes nearer to the wall.
     """

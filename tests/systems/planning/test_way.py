@@ -15,6 +15,7 @@ from systems.planning.way import (
     DOUBTFUL,
     FREE,
     NEAR,
+    NEAR_M,
     OCCUPIED,
     STRAIGHT,
     TIGHT,
@@ -26,7 +27,7 @@ from systems.planning.way import (
 from systems.safety.free_space import make_free_space
 
 CELLS, NARROW, RADIUS = 80, 0.43, 0.466
-WIDTHS = NARROW, RADIUS
+WIDTHS = NARROW, RADIUS, RADIUS + NEAR_M
 
 
 def known_space(*, free=True):
