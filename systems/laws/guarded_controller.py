@@ -19,7 +19,6 @@ from systems.planning.drive_state import (
 from systems.planning.following import CRUISE_SPEED_M_S
 from systems.planning.guarded_drive import drive_guarded
 from systems.planning.looks import HazardSensors
-from systems.planning.way import NEAR_M
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.braking import CREEP_M_S
 from systems.safety.outline import Outline, is_long
@@ -147,14 +146,11 @@ class GuardedController(Block):
         # wide body, the difference is too small to risk a place where it cannot turn.
         disc, outline = body_radius(robot), Outline.of(robot)
         narrow = 0.5 * robot.width_m if robot.length_m > robot.width_m else disc
-        creep, near = 0.0, disc + margin + NEAR_M
+        creep = 0.0
         if is_long(outline):
             # Echoes seem to come from up to one cell in front of a wall.
             rest = CREEP_M_S if guard.obstacle_speed_m_s else CRUISE_SPEED_M_S
             creep, narrow = _CREEP_SHARE * rest, narrow - guard.cell_m
-            # While the robot brakes, an obstacle in view may come so much nearer.
-            braking_s = cruise_speed(robot) / guard.braking_m_s2
-            near += (guard.obstacle_speed_m_s or 0.0) * braking_s
         widest = 2.0 * (disc + margin)
         if guard.obstacle_speed_m_s == 0.0:
             widest = min(widest, _WIDE * robot.width_m)
@@ -163,7 +159,7 @@ class GuardedController(Block):
             robot.control_point_m,
             hazard_sensors(sensors, robot, tick_s),
             (0.5 * robot.length_m, 0.5 * robot.width_m),
-            (narrow + margin, disc + margin, near),
+            (narrow + margin, disc + margin),
             cruise_speed(robot),
             tick_s,
             creep,

@@ -82,11 +82,11 @@ class DriveNumbers(NamedTuple):
     sensors: HazardSensors
     half_size: tuple[float, float]
     """Half of the body's length and width, m."""
-    widths: tuple[float, float, float]
+    widths: tuple[float, float]
     """Distances that routes keep from occupied cells, m: half of the width of the body
     plus margins, and the radius of the disc around the body plus the same margins. In
     narrow passages, only the first distance is kept. For a long body, it is one cell of
-    the map less. Below the third distance, a route costs more.
+    the map less.
     """
     cruise_m_s: float
     """Largest wanted speed, m/s."""

@@ -16,7 +16,7 @@ from numba.extending import register_jitable
 from systems.planning.carrot import find_carrot
 from systems.planning.following import FollowNumbers, wanted_speed
 from systems.planning.occupied import SOURCE_CLEARANCE_M
-from systems.planning.way import NEAR_M, Way, find_way
+from systems.planning.way import Way, find_way
 
 #: Time between two plans, s.
 _REPLAN_S = 0.5
@@ -87,7 +87,7 @@ def approach_on_route(
     if tick % numbers.replan_ticks == 0 or way.points[0] == 0:
         clear = np.array([[target[0], target[1], SOURCE_CLEARANCE_M]])
         goal = target[0], target[1]
-        radii = numbers.radius_m, numbers.radius_m, numbers.radius_m + NEAR_M
+        radii = numbers.radius_m, numbers.radius_m
         find_way(way, space, (x, y), goal, 0.0, radii, clear)
     gx, gy = find_carrot(way, x, y, _LOOK_AHEAD_M)
     straight = math.hypot(target[0] - px, target[1] - py)

@@ -29,9 +29,9 @@ FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
 _DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
 # ``_TIGHT_M``: gap between the disc and an occupied cell below which the price is
 #   ``TIGHT``, m.
-# ``NEAR_M``: gap between the disc and an occupied cell below which the price is at
-#   least ``NEAR``, m.
-_TIGHT_M, NEAR_M = 0.07, 0.19
+# ``_NEAR_M``: gap between the disc and an occupied cell below which the price is
+#   ``NEAR``, m.
+_TIGHT_M, _NEAR_M = 0.07, 0.19
 # A step costs its length times the price of the cell that the step enters.
 # ``STRAIGHT``: length of a straight step.
 # ``ACROSS``: length of a diagonal step.
@@ -131,9 +131,8 @@ def find_way(
         goal: Position (x, y) of the goal, m. If the goal is outside the window, the
             route leads to the nearest cell of the window.
         time: Current time, s.
-        widths: Half of the width of the body that has to pass, radius of the disc that
-            contains the body, both with margins, and distance from occupied cells below
-            which the price is ``NEAR``, m.
+        widths: Half of the width of the body that has to pass, and radius of the disc
+            that contains the body, both with margins, m.
         clear: (n, 3) positions (x, y) and radii, m. Hits within these radii do not
             block the route, because they come from the target or from a moving body.
     """
@@ -245,8 +244,8 @@ def _keep_off(
     """
     size, cell = way.price.shape[0], way.cell_m[0]
     x, y = place[0] / cell - way.low[0], place[1] / cell - way.low[1]
-    narrow, radius, near = widths
-    reach = near / cell
+    narrow, radius = widths
+    reach = (radius + _NEAR_M) / cell
     half = 0.25
     for i in range(max(math.floor(x - reach), 0), min(math.ceil(x + reach), size)):
         for j in range(max(math.floor(y - reach), 0), min(math.ceil(y + reach), size)):
@@ -257,7 +256,7 @@ def _keep_off(
                 price = highest
             elif distance < radius + _TIGHT_M:
                 price = TIGHT
-            elif distance < near:
+            elif distance < radius + _NEAR_M:
                 price = NEAR
             way.price[i, j] = max(way.price[i, j], price)
 
