@@ -184,9 +184,10 @@ def drive_in_passage(
 ) -> None:
     """Computes the twist of a robot that passes, backs out, or leaves.
 
-    No point of the body is faster than ``creep_m_s``. While the robot passes, the middle of its front moves in the wanted direction, so that the
-    body comes in line behind it. While it leaves, it turns only so fast that no corner
-    of its rear comes nearer to the wall.
+    No point of the body is faster than ``creep_m_s``. While the robot passes, the
+    middle of its front moves in the wanted direction, so that the body comes in line
+    behind it. While it leaves, it turns only so fast that no corner of its rear comes
+    nearer to the wall.
     """
     half_length, radius = numbers.half_size[0], numbers.widths[1]
     if p.state[0] == LEAVING:

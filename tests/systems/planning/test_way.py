@@ -15,7 +15,6 @@ from systems.planning.way import (
     DOUBTFUL,
     FREE,
     NEAR,
-    NEAR_M,
     OCCUPIED,
     STRAIGHT,
     TIGHT,
@@ -27,7 +26,7 @@ from systems.planning.way import (
 from systems.safety.free_space import make_free_space
 
 CELLS, NARROW, RADIUS = 80, 0.43, 0.466
-WIDTHS = NARROW, RADIUS, RADIUS + NEAR_M
+WIDTHS = NARROW, RADIUS
 
 
 def known_space(*, free=True):
