@@ -29,7 +29,8 @@ from systems.safety.views import range_errors
 _CLEARANCE_M = 0.02
 #: Share of the top speed at which a fast robot drives. The rest is left for turns.
 _CRUISE_SHARE = 0.86
-#: Share of the largest speed that counts as rest at which a long body passes.
+#: Share at which a long body passes: of the largest speed that counts as rest, or, if
+#: all obstacles are at rest, of the speed of a small robot.
 _CREEP_SHARE = 0.96
 #: Width of a passage that a long body passes without lining up if all obstacles are at
 #: rest, as a multiple of its width.
@@ -148,7 +149,8 @@ class GuardedController(Block):
         creep = 0.0
         if is_long(outline):
             # Echoes seem to come from up to one cell in front of a wall.
-            creep, narrow = _CREEP_SHARE * CREEP_M_S, narrow - guard.cell_m
+            rest = CREEP_M_S if guard.obstacle_speed_m_s else CRUISE_SPEED_M_S
+            creep, narrow = _CREEP_SHARE * rest, narrow - guard.cell_m
         widest = 2.0 * (disc + margin)
         if guard.obstacle_speed_m_s == 0.0:
             widest = min(widest, _WIDE * robot.width_m)

@@ -92,8 +92,8 @@ class DriveNumbers(NamedTuple):
     """Largest wanted speed, m/s."""
     tick_s: float
     creep_m_s: float
-    """Speed in a passage in which a long body has to be in line with the axis, m/s. It
-    is 0 if the body is not long.
+    """Speed of the fastest point of a long body in a passage in which it has to be in
+    line with the axis, m/s. It is 0 if the body is not long.
     """
     widest_m: float
     """Width of a passage from which on a long body passes it without lining up, m."""

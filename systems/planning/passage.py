@@ -25,10 +25,10 @@ from systems.planning.turning import wrapped
 # ``LEAVING``: the robot turns away from a wall behind the passage.
 OPEN, APPROACHING, PASSING, RETREATING, LEAVING = range(5)
 
-#: Distance of the front from the passage at which it meets the axis, as a multiple of
+#: Distance of the front from the entrance at which it meets the axis, as a multiple of
 #: half of the body's length. The heading error then decreases by this power of e.
 APPROACH = 3.8
-# ``_LINED_UP_RAD``: largest heading error where the passage begins, rad.
+# ``_LINED_UP_RAD``: largest heading error at the entrance, rad.
 # ``_LINED_UP``: largest distance from the axis there, as a multiple of the half width.
 _LINED_UP_RAD, _LINED_UP = 0.015, 0.03
 #: Distance within which the front returns to the axis, as a multiple of half of the
@@ -54,7 +54,7 @@ class Passage(NamedTuple):
     axis: NDArray[np.float64]
     """Direction of the axis, rad."""
     half_m: NDArray[np.float64]
-    """Half of the length of the passage, m."""
+    """Half of the length of the part of the route whose disc is in the passage, m."""
     width_m: NDArray[np.float64]
     """Width of the passage, m."""
     approach: NDArray[np.float64]
@@ -82,6 +82,16 @@ def front_error(p: Passage, pose: Any, half_length: float) -> tuple[float, float
 
 
 @register_jitable
+def entrance(p: Passage, half_length: float) -> float:
+    """Computes where the front enters the passage, along the axis, m.
+
+    A disc that moves along the axis meets the passage half of the body's length
+    earlier.
+    """
+    return half_length - p.half_m[0]
+
+
+@register_jitable
 def along_axis(p: Passage, pose: Any, half_length: float) -> float:
     """Computes the direction in which the front has to move, from the heading, rad."""
     _, aside = front_error(p, pose, half_length)
@@ -97,13 +107,14 @@ def lines_up(
     half_length = half_size[0]
     x, y, theta = pose[0], pose[1], pose[2]
     along, aside = front_error(p, pose, half_length)
-    if along < -p.half_m[0] - (APPROACH + _EARLIER) * half_length:
+    enters = entrance(p, half_length)
+    if along < enters - (APPROACH + _EARLIER) * half_length:
         return False
     for _ in range(_MOST_STEPS):
         now = x, y, theta
         along, aside = front_error(p, now, half_length)
         error = along_axis(p, now, half_length)
-        if along >= -p.half_m[0]:
+        if along >= enters:
             off = abs(wrapped(p.axis[0] - theta))
             return off < _LINED_UP_RAD and abs(aside) < _LINED_UP * half_size[1]
         if abs(error) > _MOST_ERROR_RAD:

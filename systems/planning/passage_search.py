@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
-from systems.planning.passage import APPROACH, APPROACHING, OPEN, Passage
+from systems.planning.passage import APPROACH, APPROACHING, OPEN, Passage, entrance
 from systems.planning.passage_axis import NARROWEST, fit_axis
 from systems.planning.way import Way, is_near
 from systems.safety.free_space import (
@@ -204,7 +204,7 @@ def place_approach(
 ) -> None:  # pragma: no cover  (compiled)
     """Places the axle so that its front is on the axis and the disc is clear."""
     best = -np.inf
-    back = p.half_m[0] + APPROACH * half_length
+    back = APPROACH * half_length - entrance(p, half_length)
     c, s = math.cos(p.axis[0]), math.sin(p.axis[0])
     fx, fy = p.middle[0] - back * c, p.middle[1] - back * s
     for slant in _SLANTS:

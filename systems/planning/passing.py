@@ -53,11 +53,11 @@ _BESIDE = -0.9
 _LEAVE_SHARE, _LEAVE_M, _MOST_ROOM_M, _LEAVE_RAD = 1.0, 0.2, 0.1, 0.2
 #: Angle to the axis at which it has turned away, rad.
 _AWAY_RAD = 0.7
-# While the robot passes, a map whose axis is farther beside does not count.
-# ``_FAR_M``, ``_NEAR_M``: this distance far before the passage and near it, m.
-# ``_SURE``: distance of the front from the passage between both, as a multiple of half
-#   of the length.
-_FAR_M, _NEAR_M, _SURE = 0.2, 0.06, 1.2
+# Near a passage and in it, a map whose axis is farther beside does not count.
+# ``_SURE_M``: this distance, m.
+# ``_SURE``: distance of the front from the passage from which on this is so, as a
+#   multiple of half of the length.
+_SURE_M, _SURE = 0.06, 1.2
 
 
 @register_jitable
@@ -80,7 +80,7 @@ def plan_passage(
     if p.state[0] >= PASSING:
         state.memory.passable_s[0] = time
     if p.state[0] == RETREATING:
-        _plan_retreat(time, pose, state, points, half_size)
+        _plan_retreat(time, pose, state, points, numbers)
     elif p.state[0] == PASSING:
         _plan_passing(time, pose, state, points, space, numbers)
     if p.state[0] == LEAVING:
@@ -130,23 +130,24 @@ def _plan_passing(
         p.state[0] = LEAVING
         return
     if along < -p.half_m[0] - _SURE * half_size[0]:
-        refine_axis(p, points, _FAR_M, half_size[1])
+        refine_axis(p, points, radius, half_size[1])
     elif along < half_size[0]:
-        refine_axis(p, points, _NEAR_M, half_size[1])
+        refine_axis(p, points, _SURE_M, half_size[1])
     center_axis(p, space, pose, radius, half_size[1])
 
 
 @register_jitable
 def _plan_retreat(
-    time: float, pose: Any, state: DriveState, points: Any, half_size: Any
+    time: float, pose: Any, state: DriveState, points: Any, numbers: DriveNumbers
 ) -> None:
     """Adapts the axis, and decides whether the robot tries again or gives up."""
-    p, back = state.passage, _BACK
+    p, half_size, radius = state.passage, numbers.half_size, numbers.widths[1]
+    back = _BACK
     along, _ = front_error(p, pose, half_size[0])
     entering = along < half_size[0]
     if entering:
         p.maps[0] = 0.0
-        refine_axis(p, points, _FAR_M, half_size[1])
+        refine_axis(p, points, radius, half_size[1])
     # Before the middle, the robot may line up better from farther away.
     last = p.failures[0] >= _TRIES
     if last or (entering and not lines_up(p, pose, half_size)):
@@ -183,10 +184,10 @@ def drive_in_passage(
 ) -> None:
     """Computes the twist of a robot that passes, backs out, or leaves.
 
-    All points of the body are slow enough that the motion counts as rest. While the
-    robot passes, the middle of its front moves in the wanted direction, so that the
-    body comes in line behind it. While it leaves, it turns only so fast that no corner
-    of its rear comes nearer to the wall.
+    No point of the body is faster than ``creep_m_s``. While the robot passes, the
+    middle of its front moves in the wanted direction, so that the body comes in line
+    behind it. While it leaves, it turns only so fast that no corner of its rear comes
+    nearer to the wall.
     """
     half_length, radius = numbers.half_size[0], numbers.widths[1]
     if p.state[0] == LEAVING:

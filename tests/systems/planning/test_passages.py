@@ -59,7 +59,7 @@ def test_a_body_whose_front_follows_the_axis_lines_up_as_a_tractrix(heading):
     passage.half_m[0] = 1.0
     needed = HALF[0] * math.log(math.tan(abs(heading) / 2) / math.tan(0.015 / 2))
     for way, expected in ((1.03 * needed, True), (0.97 * needed, False)):
-        front = -1.0 - way
+        front = HALF[0] - 1.0 - way
         pose = front - HALF[0] * math.cos(heading), -HALF[0] * math.sin(heading)
         assert front_error(passage, (*pose, heading), HALF[0]) == pytest.approx(
             (front, 0.0), abs=1e-12
