@@ -117,7 +117,7 @@ def test_what_cannot_be_joined(tmp_path):
         (paths, [0.0, 0.1, np.nan, 0.0], "starts_s: .*not finite"),
         (paths, [0.0, 0.1, 9.0, 0.0], "mic1.wav' ends 7.000 s before .*mic3.wav"),
         (paths[:1], None, "mic1.wav' is mono, .*needs 4; .*one file per microphone"),
-        (paths[:3], None, r"2 further files has 3 channels, but the array \S+ "),
+        (paths[:3], None, "2 further files has 3 channels, but the array "),
         (paths[:1], [0.0], "starts_s: applies to several files only"),
         (tmp_path, None, "is a folder.*name the files in it"),
     ]
