@@ -65,8 +65,8 @@ def simulate(
             simulated time, s.
         engine: ``drake`` for Drake's simulator, or ``compiled`` for the same blocks in
             one compiled loop. The first compiled run takes 20 to 80 s to compile
-            the blocks; the compiled code stays on the disk. None selects the engine of the
-            scenario, where ``auto`` means ``drake``.
+            the blocks; the compiled code stays on the disk. None selects the engine of
+            the scenario, where ``auto`` means ``drake``.
         audio: Open files for the sound of the run, or None to save no sound.
         realtime_rate: Greatest ratio of simulated time to real time. Drake's simulator
             waits if it is faster, and calls ``progress`` at every tick (control
