@@ -236,7 +236,7 @@ def _loaded(source: str, named: tuple[tuple[str, Any], ...]) -> Any:
 
 @cache
 def _say_that_it_takes_time() -> None:
-    _LOGGER.info("compiling code for this kind of scenario, once, for 20 to 80 s ...")
+    _LOGGER.info("compiling code for this kind of scenario, for up to 80 s ...")
 
 
 def address_of(part: Any) -> int:
