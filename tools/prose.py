@@ -54,6 +54,7 @@ PATTERNS = {
     r"\basked for\b(?! by)|\bis asked of\b": "required, requested",
     r"\bstands? in (?:the|a|its)\b": "is in",
     r"\bhold(?:s|ing)? for (?:what|who)": "applies to",
+    r"(?m)^[ \t]*%(?=[ ,.;:)])": "move % up: pages omit this line as a comment",
     r"[—–]": "a colon, a comma or two sentences",  # noqa: RUF001
 }
 _OWN = [(re.compile(pattern), hint) for pattern, hint in PATTERNS.items()]
